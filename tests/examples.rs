@@ -1,11 +1,11 @@
-//! The example draws the documents' tables, and the documentation shows what it draws.
+//! Checks that the example draws the documents' tables and that the documentation shows them as they are drawn.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use image::RgbImage;
 
-/// An example that cargo built beside this test.
+/// Returns the path of an example that cargo built beside this test.
 fn example(name: &str) -> PathBuf {
     let mut path = std::env::current_exe().expect("this test is a file");
     path.pop();
@@ -13,7 +13,7 @@ fn example(name: &str) -> PathBuf {
     path.join(name).with_extension(std::env::consts::EXE_EXTENSION)
 }
 
-/// Part of the pixels in which two pictures differ by more than software rasterizers do: 3 codes.
+/// Returns the fraction of pixels in which two pictures differ by more than software rasterizers do: 3 codes.
 fn differing(a: &RgbImage, b: &RgbImage) -> f64 {
     assert_eq!(a.dimensions(), b.dimensions());
     let apart =
@@ -30,13 +30,13 @@ fn the_documentation_shows_the_tables_as_they_are_drawn() {
     let [first, second] = ["table-1.1.png", "table-2.1.png"].map(|name| {
         let drawn = image::open(folder.path().join(name)).unwrap().to_rgb8();
         let shown = image::open(images.join(name)).unwrap().to_rgb8();
-        // Pixels on edges may fall otherwise on another driver.
+        // Pixels on edges may differ with another driver.
         let part = differing(&drawn, &shown);
         assert!(part < 0.01, "{name}: {part} of the pixels differ; run scripts/pictures");
         assert!(std::fs::metadata(images.join(name)).unwrap().len() < 150_000, "{name} is small");
         drawn
     });
-    // Negative control: another cell of the same table.
+    // Control: another cell of the same table.
     let side = first.height();
     let cell = |index: u32| image::imageops::crop_imm(&first, index * (side + 4), 0, side, side).to_image();
     assert!(differing(&cell(0), &cell(1)) > 0.1 && second.width() == second.height());

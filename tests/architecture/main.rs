@@ -1,4 +1,5 @@
-//! The plan of the house, kept: crates depend downwards only, modules of a crate too, and of wgpu, winit and glam one each is built.
+//! Checks the architecture: crates depend downwards only, modules within a crate too, and only one version each of
+//! wgpu, winit and glam is built.
 
 mod module_circles;
 
@@ -6,7 +7,8 @@ use std::collections::BTreeSet;
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
 
-/// Each crate with the crates of ours that it may use, and the outside ones that it must never use (design: rooms, from the ground up).
+/// Each crate with those of our crates that it may use, and the external crates that it must never use, from the
+/// lowest crate up.
 const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("lumbre_optics", &[], &["wgpu", "gltf", "image", "winit"]),
     ("lumbre_mesh", &[], &["wgpu", "bevy_ecs", "gltf", "winit"]),
@@ -59,13 +61,13 @@ fn metadata() -> Metadata {
         .expect("cargo metadata answers")
 }
 
-/// Names of what a package needs to be built, development apart.
+/// Names of the packages that a package needs to be built, without development dependencies.
 fn needs(package: &Package) -> BTreeSet<&str> {
     let shipped = package.dependencies.iter().filter(|needed| needed.kind != DependencyKind::Development);
     shipped.map(|needed| needed.name.as_str()).collect()
 }
 
-/// What is wrong with the dependencies of a crate of that name.
+/// Returns what is wrong with the dependencies of a crate with that name.
 fn faults(name: &str, needs: &BTreeSet<&str>) -> Vec<String> {
     let Some((_, may, never)) = ROOMS.iter().find(|(room, ..)| *room == name) else {
         return vec![format!("{name} has no place in the plan of the house: give it one in ROOMS")];
@@ -104,7 +106,8 @@ fn an_upward_or_forbidden_dependency_is_seen() {
 
 #[test]
 fn one_wgpu_one_winit_one_glam_are_built() {
-    // `cargo metadata` and the lock file also list what no feature switches on; `cargo tree` lists what is built.
+    // `cargo metadata` and the lock file also list crates that no feature enables; `cargo tree` lists what is
+    // built.
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let arguments = ["tree", "--offline", "--locked", "--workspace", "--target", "all", "--prefix", "none"];
     let output = std::process::Command::new(cargo)
@@ -124,7 +127,8 @@ fn one_wgpu_one_winit_one_glam_are_built() {
     }
 }
 
-/// Where the links of a Markdown page lead, each with the inline code that follows it up to the next link or the end of the line.
+/// Returns the targets of the links of a Markdown page, each with the inline code that follows it up to the next
+/// link or the end of the line.
 fn links(page: &str) -> Vec<(String, Vec<String>)> {
     let mut found = Vec::new();
     for line in page.lines() {
@@ -132,7 +136,7 @@ fn links(page: &str) -> Vec<(String, Vec<String>)> {
         parts.next();
         for part in parts {
             let Some((target, rest)) = part.split_once(')') else { continue };
-            // What comes before the next link's text.
+            // The text before the next link's text.
             let rest = rest.rsplit_once('[').map_or(rest, |(before, _)| before);
             let code = rest.split('`').skip(1).step_by(2).map(str::to_owned).collect();
             found.push((target.to_owned(), code));
@@ -163,7 +167,7 @@ fn what_the_documentation_names_exists() {
             let local = !target.contains("://");
             let path = page.parent().unwrap().join(target.split('#').next().unwrap_or_default());
             assert!(!local || path.exists(), "{} names {target}, which is not there", page.display());
-            // Behind a link to a test's file stand the names of tests.
+            // A link to a test's file is followed by the names of tests.
             let is_name = |code: &&String| {
                 code.contains('_') && code.bytes().all(|c| c == b'_' || c.is_ascii_alphanumeric())
             };
@@ -178,13 +182,13 @@ fn what_the_documentation_names_exists() {
             }
         }
     }
-    // Rows 1 to 23 of the documents, most with a test by name, and those of the hard cases of baking.
+    // Rows 1 to 23 of the documents, most with a named test, and those of the hard cases of baking.
     assert!(tests > 80, "only {tests} tests are named");
     let rows = std::fs::read_to_string(root.join("docs/documents.md")).unwrap();
     for row in 1..=23 {
         assert!(rows.contains(&format!("\n| {row} | ")), "row {row} is missing");
     }
-    // Negative control.
+    // Control of the parser.
     let sample = "see [a](../x/a.rs) `one_test`, `two` and [b](b.md#part) or ![c](c.png)";
     let expected = [("../x/a.rs", vec!["one_test", "two"]), ("b.md#part", vec![]), ("c.png", vec![])];
     let found = links(sample);
@@ -197,7 +201,7 @@ fn what_the_documentation_names_exists() {
     }
 }
 
-/// The first column of each table of a page, below its heading.
+/// Returns the first column of each table of a page, without its heading.
 fn first_columns(page: &str) -> Vec<Vec<&str>> {
     let mut tables = Vec::new();
     for line in page.lines() {

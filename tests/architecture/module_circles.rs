@@ -1,26 +1,27 @@
-//! The modules of a crate import each other downwards only: which lines import what is read from the sources, re-exports at the crate's root
-//! included. Not the crates among each other, and not the files within a module.
+//! Checks that the modules of a crate import each other downwards only. The imports are read from the sources,
+//! including re-exports at the crate's root. Dependencies between crates, and between the files within a module,
+//! are not checked here.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use syn::visit::{self, Visit};
 
-/// What each module directly under a crate's root imports of its siblings, each with a file that does.
+/// For each module directly below a crate's root, the siblings that it imports, each with a file that imports it.
 type Imports = BTreeMap<String, BTreeMap<String, String>>;
 
-/// The sources of a crate: each file's path below `src`, without its ending, and its text.
+/// The sources of a crate: each file's path below `src`, without its extension, and its text.
 type Sources = Vec<(String, String)>;
 
-/// Collects the paths of a file that begin at the crate's root.
+/// Collects the paths of a file that start at the crate's root.
 struct Paths<'a> {
-    /// Modules from the root down to the file's own.
+    /// Modules from the root to the file's own.
     own: &'a [String],
     found: Vec<Vec<String>>,
 }
 
 impl Paths<'_> {
-    /// `crate::a::b` and `super::a::b` as `[a, b]`, from the root.
+    /// Adds `crate::a::b` and `super::a::b` as `[a, b]`, from the root.
     fn add(&mut self, path: &[String]) {
         let Some((first, rest)) = path.split_first() else { return };
         if first == "crate" {
@@ -55,7 +56,7 @@ impl Paths<'_> {
     }
 }
 
-/// Tests may look upwards: they compare with what is built on top.
+/// Tests may import upwards, as they compare with what is built on top.
 fn is_for_tests(attributes: &[syn::Attribute]) -> bool {
     let tests = |attribute: &syn::Attribute| {
         attribute.path().is_ident("cfg")
@@ -84,7 +85,7 @@ impl<'ast> Visit<'ast> for Paths<'_> {
     }
 }
 
-/// What the root names of its modules' contents: `pub use error::BakeError` is `BakeError` of `error`.
+/// Returns which names the root re-exports from its modules: `pub use error::BakeError` is `BakeError` of `error`.
 fn named_at_root(root: &syn::File) -> BTreeMap<String, String> {
     fn leaves(tree: &syn::UseTree, module: Option<&str>, found: &mut BTreeMap<String, String>) {
         let mut add = |name: &syn::Ident| {
@@ -113,7 +114,7 @@ fn named_at_root(root: &syn::File) -> BTreeMap<String, String> {
     found
 }
 
-/// Reads what the modules of a crate import.
+/// Finds what the modules of a crate import.
 fn imports(sources: &Sources) -> Result<Imports, syn::Error> {
     let files: Vec<(Vec<String>, syn::File)> = sources
         .iter()
@@ -147,7 +148,7 @@ fn imports(sources: &Sources) -> Result<Imports, syn::Error> {
     Ok(imports)
 }
 
-/// Imports that lead back to where they come from, in words.
+/// Returns descriptions of the circular imports.
 fn circles(imports: &Imports) -> Vec<String> {
     let reaches = |from: &str, to: &str| {
         let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
@@ -215,7 +216,7 @@ fn a_circle_is_seen_and_a_test_may_look_upwards() {
         circles(&imports(&sources).expect("these can be parsed"))
     };
     assert_eq!(found("pub struct Short;"), Vec::<String>::new());
-    // By its module, by the name at the root, within a path, and from a module inside.
+    // By its module, by the name at the root, within a path, and from an inner module.
     for upwards in [
         "use crate::high::Tall;",
         "use crate::{Tall as Long};",

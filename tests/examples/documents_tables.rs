@@ -1,4 +1,5 @@
 //! Draws the two tables of pictures of document [M], 2.1 and 1.1, into a folder.
+//!
 //! `cargo run --release -p lumbre_tests --example documents_tables -- docs/images`
 
 use std::path::PathBuf;
@@ -9,7 +10,7 @@ use lumbre_optics::Shading;
 use lumbre_render::{FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
 use lumbre_tests::scenes::documents::{table_1_1, table_2_1};
 
-/// White between the cells, in pixels.
+/// White space between the cells, in pixels.
 const GAP: u32 = 4;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -22,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// One picture of all scenes, in rows of as many.
+/// Draws all scenes as one picture with these rows, all of the same length.
 fn table(gpu: &Gpu, rows: Vec<Vec<World>>, cell: u32) -> Result<RgbImage, Box<dyn std::error::Error>> {
     let frame = Offscreen::new(gpu, cell, cell, OffscreenFormat::Rgba8)?;
     let mut renderer = Renderer::new(gpu);

@@ -1,4 +1,5 @@
-//! Accounts of frames: stages, passes and the remainder are the wall clock, and effects are the same cut in another way. Their numbers are of the machine; that they sum is not.
+//! Accounting of frames: stages, passes and the remainder add up to the wall clock, and the effects are the same
+//! time divided differently. The numbers depend on the machine; that they add up does not.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
@@ -13,7 +14,7 @@ use lumbre_scene::{Camera, Mesh, Transform};
 use super::own_effects::bloom::{Bloom, BloomEffect};
 use crate::adapter::gpu;
 
-/// A ball, one of glass, a floor, a lamp with a shadow, and a camera that blooms.
+/// A ball, a glass ball, a floor, a lamp with a shadow, and a camera with bloom.
 fn world() -> World {
     let mut world = World::new();
     let ball = Mesh::from(shapes::uv_sphere(1.0, 24, 12));
@@ -40,7 +41,7 @@ impl Canvas {
         Self { renderer, target: Offscreen::new(gpu(), 96, 64, OffscreenFormat::Rgba8).unwrap() }
     }
 
-    /// The account of a frame that was waited for.
+    /// Draws a frame, waits for it, and returns its accounting.
     fn account(&mut self, world: &mut World, measure: Measure) -> Accounting {
         let options = FrameOptions { measure, ..FrameOptions::default() };
         self.renderer.render(world, &self.target.target(), &options).unwrap();
@@ -49,7 +50,7 @@ impl Canvas {
     }
 }
 
-/// As f64 sums, whatever the order.
+/// Returns true if two sums of f64 are equal up to the order of their terms.
 fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-9 * a.abs().max(b.abs()).max(1.0)
 }
@@ -58,17 +59,17 @@ fn check_sums(accounting: &Accounting) {
     let sum = |numbers: &mut dyn Iterator<Item = f64>| numbers.sum::<f64>();
     let wall = accounting.wall_ms.unwrap();
     assert!(same(accounting.accounted_ms() + accounting.remainder_ms().unwrap(), wall));
-    // The clock's parts follow each other.
+    // The parts of the wall clock are consecutive.
     let parts = accounting.cpu_ms + accounting.between_ms.unwrap() + accounting.waiting_ms.unwrap();
     assert!(same(parts, wall), "{accounting:#?}");
     assert!(accounting.between_ms.unwrap() >= 0.0 && accounting.waiting_ms.unwrap() > 0.0);
     for stage in &accounting.stages {
         assert!(stage.ms >= 0.0 && stage.ms <= accounting.cpu_ms, "{stage:?}");
     }
-    // What belongs to no stage is a reading of the clock or two.
+    // Time outside of all stages is only that of reading the clock.
     let stages = sum(&mut accounting.stages.iter().map(|stage| stage.ms));
     assert!(stages <= accounting.cpu_ms * (1.0 + 1e-9), "a stage counts twice: {accounting:#?}");
-    // By effects it is the same time, the same work, the same bytes.
+    // Divided by effects it is the same time, the same work, and the same bytes.
     let effects = &accounting.effects;
     assert!(same(sum(&mut effects.iter().map(|effect| effect.cpu_ms)), accounting.cpu_ms));
     assert!(effects.iter().all(|effect| effect.cpu_ms >= 0.0), "{effects:#?}");
@@ -91,7 +92,7 @@ fn stages_passes_and_effects_sum_to_the_frame() {
     let of = |accounting: &Accounting, name: &str| {
         accounting.effects.iter().find(|effect| effect.effect == name).cloned().unwrap_or_default()
     };
-    // What each did in its first frame, and nobody else.
+    // What each effect did in its first frame, separate from the others.
     let (shadows, bloom, display) = (of(&first, "shadow maps"), of(&first, "bloom"), of(&first, "display"));
     assert_eq!((shadows.passes.len(), shadows.pipelines_made), (1, 2));
     assert_eq!(shadows.uploaded_bytes, first.uploads.shadows);
@@ -102,13 +103,13 @@ fn stages_passes_and_effects_sum_to_the_frame() {
     let scene = of(&first, SCENE);
     assert!(scene.pipelines_made >= 2 && scene.uploaded_bytes > 0 && scene.passes.is_empty(), "{scene:?}");
 
-    // Nothing is new in the next one, and the shadow map is there; a frame of a still World has few stages.
+    // Nothing is new in the next frame, and the shadow map is kept; a frame of an unchanged world has few stages.
     let second = canvas.account(&mut world, Measure::TimeAndInvocations);
     check_sums(&second);
     assert!(second.effects.iter().all(|effect| effect.pipelines_made == 0), "{:#?}", second.effects);
     assert_eq!((of(&second, "shadow maps").passes.len(), second.uploads.lights), (0, 0));
     assert!(second.frame == first.frame + 1);
-    // Frames that nobody measures have no account; of several on their way the last one is waited for.
+    // Frames that are not measured have no accounting; with several in flight, the last one is waited for.
     let report =
         canvas.renderer.render(&mut world, &canvas.target.target(), &FrameOptions::default()).unwrap();
     assert!(report.accounting.is_none() && canvas.renderer.accounting() == Some(&second));
@@ -135,23 +136,23 @@ fn a_renderer_is_built_without_some_of_its_effects() {
     let without = |effect| Renderer::builder().without(effect).build(gpu());
     let srgb = Display::Srgb;
     let whole = picture(Renderer::new(gpu()), &mut world(), srgb).unwrap();
-    // Shadows are as good as switched off.
+    // Without the effect it is as if shadows were switched off.
     let mut canvas = Canvas::new(Renderer::new(gpu()));
     let options = FrameOptions { shadows: false, ..FrameOptions::default() };
     canvas.renderer.render(&mut world(), &canvas.target.target(), &options).unwrap();
     let shadeless = picture(without(BuiltIn::ShadowMaps), &mut world(), srgb).unwrap();
     assert!(shadeless == canvas.target.read_rgba8(gpu()).unwrap() && shadeless != whole);
-    // Surfaces that nobody draws are not there; the background is.
+    // Surfaces that nothing draws are missing; the background is there.
     let mut pictures = vec![whole];
     for effect in [BuiltIn::Forward, BuiltIn::Transparent] {
         let left = picture(without(effect), &mut world(), srgb).unwrap();
         assert!(pictures.iter().all(|other| *other != left), "{effect:?}");
         pictures.push(left);
     }
-    // What is blended needs a display pass.
+    // Blended surfaces need a display pass.
     let refused = picture(without(BuiltIn::Display), &mut world(), srgb);
     assert!(matches!(refused, Err(RenderError::NoDisplay)), "{refused:?}");
-    // Explained as it is drawn.
+    // The explanation agrees with what is drawn.
     let mut renderer =
         Renderer::builder().without(BuiltIn::ShadowMaps).without(BuiltIn::Forward).build(gpu());
     let explanation = renderer.explain(&mut world(), &FrameOptions::default(), 96, 64).unwrap();

@@ -8,10 +8,10 @@ use lumbre_render::{
     Accounting, Display, FrameOptions, FrameReport, Gpu, Offscreen, OffscreenFormat, RenderError, Renderer,
 };
 
-/// What wgpu's validation complained about, and nobody caught.
+/// Validation errors of wgpu that no error scope caught.
 static COMPLAINTS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// The device. Without a driver the tests fail, and say what to install.
+/// Returns the shared device. Without a driver the tests fail with a message on what to install.
 pub fn gpu() -> &'static Gpu {
     static GPU: OnceLock<Gpu> = OnceLock::new();
     GPU.get_or_init(|| match Gpu::headless() {
@@ -25,7 +25,7 @@ pub fn gpu() -> &'static Gpu {
     })
 }
 
-/// Options that keep radiance as it is, in full precision, probed.
+/// Options for unchanged radiance in full precision, with the probe on.
 pub fn linear() -> FrameOptions {
     FrameOptions { display: Display::Linear, full_precision: true, probe: true, ..FrameOptions::default() }
 }
@@ -35,7 +35,8 @@ pub fn draw(world: &mut World, width: u32, height: u32, options: &FrameOptions) 
     Canvas::new(width, height).draw(world, options)
 }
 
-/// Draws a frame as people see it: half floats, the display's curve, eight bits. RGBA, top row first; fails as [`draw`] does.
+/// Draws a frame with the default display: half floats, a tone curve, eight bits. Returns RGBA, top row first;
+/// fails as [`draw`] does.
 #[allow(dead_code, reason = "shared with the hard cases, which show what overflows")]
 pub fn shown(world: &mut World, width: u32, height: u32, options: &FrameOptions) -> Vec<u8> {
     let mut canvas = Canvas::of(width, height, OffscreenFormat::Rgba8);
@@ -43,14 +44,14 @@ pub fn shown(world: &mut World, width: u32, height: u32, options: &FrameOptions)
     canvas.frame.read_rgba8(gpu()).unwrap()
 }
 
-/// One renderer and one target for several frames, so that what it keeps from frame to frame is under test too.
+/// One renderer and one target for several frames, so that what is kept from frame to frame is tested too.
 pub struct Canvas {
     renderer: Renderer,
     frame: Offscreen,
 }
 
 impl Canvas {
-    /// A fresh renderer and a target of linear floats.
+    /// Creates a new renderer and a target of linear floats.
     pub fn new(width: u32, height: u32) -> Self {
         Self::of(width, height, OffscreenFormat::LinearFloat)
     }
@@ -61,20 +62,22 @@ impl Canvas {
         Self { renderer: Renderer::new(gpu), frame }
     }
 
-    /// Draws a frame; fails if any pass left a value that is not finite, or if wgpu's validation complained.
+    /// Draws a frame; fails if any pass leaves a value that is not finite, or if wgpu's validation reports an
+    /// error.
     pub fn draw(&mut self, world: &mut World, options: &FrameOptions) -> (Vec<DVec3>, FrameReport) {
         let report = self.probed(world, options);
         let pixels = self.frame.read_linear(gpu()).unwrap();
         (pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(), report)
     }
 
-    /// The account of the last frame, if it was measured.
+    /// Returns the accounting of the last frame, which must have been measured.
     #[allow(dead_code, reason = "shared with the hard cases, which count nothing")]
     pub fn accounting(&self) -> &Accounting {
         self.renderer.accounting().expect("the frame was measured")
     }
 
-    /// Every frame of a test goes through here, whatever its options say: the hard cases look that there is no other way.
+    /// Draws a frame with the probe on, regardless of the options. Every frame of a test goes through here, which
+    /// the hard cases check.
     fn probed(&mut self, world: &mut World, options: &FrameOptions) -> FrameReport {
         let _guard = one_at_a_time();
         let options = FrameOptions { probe: true, ..options.clone() };
@@ -87,7 +90,7 @@ impl Canvas {
         report
     }
 
-    /// Tries to draw what cannot be drawn.
+    /// Expects that a frame cannot be drawn, and returns the error.
     pub fn refuse(&mut self, world: &mut World, options: &FrameOptions) -> RenderError {
         let _guard = one_at_a_time();
         match self.renderer.render(world, &self.frame.target(), options) {
@@ -97,7 +100,8 @@ impl Canvas {
     }
 }
 
-/// The software rasterizer uses every core anyway, and a test's time is then its own. Held by a test that failed, it still serves.
+/// Serializes the tests: the software rasterizer uses every core anyway, and each test's time is then its own. The
+/// lock can still be used after a test that held it failed.
 fn one_at_a_time() -> MutexGuard<'static, ()> {
     static ONE: Mutex<()> = Mutex::new(());
     ONE.lock().unwrap_or_else(PoisonError::into_inner)

@@ -1,4 +1,5 @@
-//! Baked scenes: what the baker writes is what the frame shows, in the twin too, and it looks like radiosity.
+//! Baked scenes: the frame shows what the baker wrote and agrees with the twin, and the result looks like
+//! radiosity.
 
 use std::sync::Arc;
 
@@ -16,8 +17,9 @@ use crate::adapter::{draw, linear};
 
 const SIZE: usize = 120;
 
-/// f16 lightmaps round to 2^-11 relative, the texture unit's bilinear weights to 2^-8 of the step between texels (Vulkan's least
-/// precision): with steps of at most a tenth of the radiance near 1 that is 5e-4 + 4e-4.
+/// f16 lightmaps are rounded to 2^-11 relative, and the texture unit's bilinear weights to 2^-8 of the step between
+/// texels (Vulkan's minimum precision): with steps of at most a tenth of the radiance, which is near 1, that is
+/// 5e-4 + 4e-4.
 const LARGEST: f64 = 2e-3;
 const RELATIVE_L2: f64 = 1e-3;
 
@@ -42,7 +44,7 @@ fn the_baked_cornell_box_shows_its_lightmaps() {
     let (got, report) = draw(&mut world, SIZE as u32, SIZE as u32, &linear());
     assert!(report.plan.status("lightmap").unwrap().runs());
     let expected = twin::draw(&mut world, SIZE, SIZE, TwinOptions::default());
-    // The lamp's radiance of 100 would drown the rest in the norm.
+    // The lamp's radiance of 100 would dominate the norm.
     let interior: Vec<_> =
         expected.interior(false).into_iter().map(|p| p.filter(|p| p.max_element() < 10.0)).collect();
     let some: Vec<_> = got.iter().copied().map(Some).collect();
@@ -52,7 +54,7 @@ fn the_baked_cornell_box_shows_its_lightmaps() {
     assert!(difference.largest < LARGEST, "{difference:?}");
     assert!(difference.relative_l2 < RELATIVE_L2, "{difference:?}");
 
-    // Negative control: without its lightmaps the box is black but for the lamp.
+    // Negative control: without its lightmaps the box is black except for the lamp.
     let (dark, report) =
         draw(&mut world, SIZE as u32, SIZE as u32, &FrameOptions { lightmaps: false, ..linear() });
     assert!(!report.plan.status("lightmap").unwrap().runs());
@@ -60,7 +62,8 @@ fn the_baked_cornell_box_shows_its_lightmaps() {
     assert!(compare(&dark, &interior).relative_l2 > 0.9);
 }
 
-/// wgpu-core 30 once left a lightmap out that the draw before had bound too, where that had textures and this has none.
+/// wgpu-core 30 once skipped binding a lightmap that the previous draw had also bound, if that draw had textures
+/// and this one has none.
 #[test]
 fn a_lightmap_is_shared_by_what_has_textures_and_what_has_none() {
     let mut world = World::new();
@@ -75,7 +78,7 @@ fn a_lightmap_is_shared_by_what_has_textures_and_what_has_none() {
     for number in 0..6 {
         let mut ball = lumbre_mesh::shapes::uv_sphere(0.3, 24, 12);
         ball.uv1 = vec![glam::Vec2::splat(0.5); ball.positions.len()];
-        // From the nearest to the farthest, as they are drawn.
+        // From the nearest to the farthest, in the order in which they are drawn.
         let place =
             lumbre_scene::Transform::from_xyz(0.7 * f64::from(number) - 1.75, 0.0, -0.1 * f64::from(number));
         let ball = (lumbre_scene::Mesh::from(ball), Material::matt(Vec3::splat(0.5)), place);
@@ -89,7 +92,7 @@ fn a_lightmap_is_shared_by_what_has_textures_and_what_has_none() {
         }
     }
     world.spawn((lumbre_scene::Camera::default(), lumbre_scene::Transform::from_xyz(0.0, 0.0, 4.0)));
-    // A light with a shadow, too faint to be seen: its group stands behind the lightmap's.
+    // A light with a shadow, too faint to be visible; its bind group comes after the lightmap's.
     let faint = lumbre_optics::Light { shadow: true, ..lumbre_optics::Light::point(Vec3::splat(1e-12)) };
     for shadows in [false, true] {
         if shadows {
@@ -112,7 +115,8 @@ fn colour_bleeds_and_nothing_inside_is_black() {
     let mut found = world.query::<(&lumbre_scene::Mesh, &lumbre_scene::Primitive)>();
     let names: Vec<String> = found.iter(&world).map(|(_, primitive)| primitive.mesh.to_string()).collect();
     assert!(names.iter().any(|name| name == "large_box"), "{names:?}");
-    // The side of the tall box that faces the red wall on the left is redder than it is green, the floor is grey-ish and lit.
+    // The side of the tall box that faces the red wall on the left is redder than it is green, and the floor is
+    // greyish and lit.
     let of = |name: &str, left: bool| -> Vec<DVec3> {
         let of_object = |at: usize| frame.surface[at].is_some_and(|(object, _)| names[object] == name);
         let columns: Vec<usize> = (0..SIZE * SIZE).filter(|&at| of_object(at)).map(|at| at % SIZE).collect();
@@ -153,12 +157,13 @@ fn static_lights_of_a_baked_level_are_not_counted_twice() {
     Bake::new(&options).run(&mut world).unwrap();
     assert_eq!(world.query::<&Lightmap>().iter(&world).count(), 1);
     let baked = center(&mut world);
-    // One lamp over a convex floor: no bounce, so baked and shaded light are the same but for the texels' width (1/8 m at 1.9 m under
-    // the lamp: the inverse square and the cosine change by under 1 % over it) and sampling.
+    // There is one lamp over a convex floor, so there are no bounces. Baked and shaded light are then equal up to
+    // the texels' width (1/8 m at 1.9 m under the lamp, over which the inverse square and the cosine change by less
+    // than 1 %) and sampling.
     assert!((baked / shaded - 1.0).abs() < 0.02, "shaded {shaded}, baked {baked}");
 }
 
-/// Replaces every texel, each map once.
+/// Replaces every texel of every lightmap.
 fn change_texels(world: &mut World, change: impl Fn(Vec3) -> Vec3) {
     let mut lightmaps = world.query::<&mut Lightmap>();
     for mut lightmap in lightmaps.iter_mut(world) {
@@ -186,9 +191,10 @@ fn a_room_from_ktx2_differs_from_the_one_from_open_exr_by_the_encoding_and_no_mo
             pixels
         };
         let (exr, ktx2) = (frame(&path, &|_| ()), frame(&packed, &|_| ()));
-        // A frame is linear in its lightmaps. So the frame of the texels' own bounds, in the place of their light, is the bound of every
-        // pixel: filtered and reflected as the light is. To the format's bound comes the half float of the other side, 2^-11 or 2^-25;
-        // and 1/1000 of both for the bound's own half float.
+        // A frame is linear in its lightmaps. A frame drawn with the texels' error bounds in place of their light
+        // is therefore the bound of every pixel, filtered and reflected as the light is. To the format's bound is
+        // added the half float of the other side, 2^-11 or 2^-25, and 1/1000 of both for the bound's own half
+        // float.
         let bound = frame(&path, &|world| {
             let halves = |texel: Vec3| (texel / 2048.0).max(Vec3::splat(2f32.powi(-25)));
             change_texels(world, |texel| (format.largest_error(texel) + halves(texel)) * 1.001);
@@ -197,16 +203,16 @@ fn a_room_from_ktx2_differs_from_the_one_from_open_exr_by_the_encoding_and_no_mo
         });
         let (mut largest, mut differ) = (0.0f64, 0);
         for ((exr, ktx2), bound) in exr.iter().zip(&ktx2).zip(&bound) {
-            // And the frame's own f32: some roundings of the pixel.
+            // In addition there is the frame's own f32: a few roundings of the pixel.
             let over = ((*exr - *ktx2).abs() / (*bound + exr.abs() * 1e-6 + 1e-12)).max_element();
             assert!(over <= 1.0, "{format:?}: {exr} and {ktx2}, bound {bound}");
             largest = largest.max(over);
             differ += usize::from(exr != ktx2);
         }
         println!("{format:?}: {differ} pixels differ, by {largest:.3} of the bound at most");
-        // Negative control: it is another encoding, and the bound is no wild one.
+        // Negative control: the encoding differs, and the bound is not too wide.
         assert!(differ > SIZE * SIZE / 4 && largest > 0.1, "{format:?}: {differ}, {largest}");
-        // And one code of the mantissa more would be seen.
+        // An error of one more code of the mantissa would be detected.
         let scaled = frame(&packed, &|world| change_texels(world, |texel| texel * (1.0 + 3.0 / 64.0)));
         let seen = exr.iter().zip(&scaled).zip(&bound);
         assert!(

@@ -1,4 +1,4 @@
-//! A ball under every kind of light, in every shading and reflection model, against the f64 twin.
+//! A ball under every kind of light, in every shading and reflection model, compared with the f64 twin.
 
 use glam::DVec3;
 use lumbre_optics::{Light, ReflectionModel, Shading};
@@ -9,14 +9,15 @@ use lumbre_tests::twin::{self, TwinOptions};
 
 use crate::adapter::{draw, linear};
 
-/// Large enough that the insides of the ball's 990 triangles are seen too.
+/// Large enough for the interiors of the ball's 990 triangles to be compared too.
 const SIZE: usize = 256;
 
-/// f32 against f64. The longest chain of roundings is the specular power, n·(a few ulp) relative (n = 20 here: 20·4·2^-24 = 5e-6), the
-/// rest is of the order of the position's rounding, 2^-24·4 m, over the 3 mm that a pixel covers at most times the gradient of the
-/// highlight. Together under 1e-4 of a radiance near 1; measured at most 1.4e-5.
+/// f32 compared with f64. The longest chain of roundings is the specular power, n·(a few ulp) relative (n = 20
+/// here: 20·4·2^-24 = 5e-6). The rest is of the order of the position's rounding, 2^-24·4 m, over the 3 mm that a
+/// pixel covers at most, times the gradient of the highlight. Together that is under 1e-4 of a radiance near 1;
+/// measured at most 1.4e-5.
 const LARGEST: f64 = 1e-4;
-/// The same roundings averaged: measured at most 3.1e-6.
+/// The mean of the same roundings: measured at most 3.1e-6.
 const RELATIVE_L2: f64 = 1e-5;
 
 fn against_twin(light: Light, shading: Shading, model: ReflectionModel) -> Difference {
@@ -27,7 +28,8 @@ fn against_twin(light: Light, shading: Shading, model: ReflectionModel) -> Diffe
     let (got, _) = draw(&mut world, SIZE as u32, SIZE as u32, &options);
     let got: Vec<Option<DVec3>> = got.into_iter().map(Some).collect();
     let difference = compare(&got, &expected);
-    // The ball fills about a quarter of the frame; of flat triangles only those are compared that hold nine pixels in a square.
+    // The ball fills about a quarter of the frame; of flat triangles only those are compared that contain nine
+    // pixels in a square.
     let least = SIZE * SIZE / if shading == Shading::Flat { 24 } else { 8 };
     assert!(difference.pixels > least, "{} pixels are too few to compare", difference.pixels);
     difference
@@ -80,7 +82,8 @@ fn the_comparison_sees_a_wrong_light_a_shift_and_a_nan() {
 
 #[test]
 fn shadings_differ_as_they_should() {
-    // The documents: flat shows its polygons, Gouraud loses the highlight between vertices, Phong keeps it.
+    // As in the documents, flat shading shows polygons, Gouraud shading loses the highlight between vertices, and
+    // Phong shading keeps it.
     let (_, light) = every_light().swap_remove(2);
     let brightest = |shading| {
         let options = FrameOptions { shading: Some(shading), ..linear() };

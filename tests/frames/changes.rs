@@ -1,4 +1,5 @@
-//! Changes between frames: a renderer that has drawn before shows what a fresh one shows, bit for bit, and uploads only what changed.
+//! Changes between frames: a renderer that has drawn before draws bit for bit the same as a new one, and uploads
+//! only what changed.
 
 use std::sync::Arc;
 
@@ -16,14 +17,14 @@ use lumbre_tests::panes::{image, sharp};
 use crate::adapter::{Canvas, draw, linear};
 
 const SIZE: u32 = 48;
-/// Objects of the scene.
+/// Number of objects in the scene.
 const OBJECTS: usize = 60;
 
-// Bytes that the shaders read of one of each (crates/lumbre_render/src/layout.rs asserts these sizes).
+// Sizes in bytes of the shaders' records for one of each (crates/lumbre_render/src/layout.rs asserts these sizes).
 const OBJECT: u64 = 96;
 const MATERIAL: u64 = 288;
 const LIGHT: u64 = 96;
-/// Per object in view: which it is, and where its lights stand.
+/// Per visible object: its index, and where its list of lights is.
 const INSTANCE: u64 = 16;
 /// Per light in a list.
 const INDEX: u64 = 4;
@@ -65,7 +66,7 @@ fn scene() -> Scene {
 }
 
 impl Scene {
-    /// Draws with the old renderer and a fresh one.
+    /// Draws with the old renderer and with a new one.
     fn redrawn(&mut self) -> (Vec<DVec3>, FrameReport) {
         let (kept, report) = self.canvas.draw(&mut self.world, &linear());
         let (fresh, _) = draw(&mut self.world, SIZE, SIZE, &linear());
@@ -74,7 +75,7 @@ impl Scene {
         (kept, report)
     }
 
-    /// Applies a change, checks that it is seen and that it costs no more than `bytes`.
+    /// Applies a change, checks that it is visible and that it uploads no more than `bytes`.
     fn change(&mut self, bytes: u64, change: impl FnOnce(&mut Self)) -> FrameReport {
         let (before, _) = self.canvas.draw(&mut self.world, &linear());
         change(self);
@@ -82,7 +83,7 @@ impl Scene {
         assert!(before != after, "negative control: the change is seen");
         let uploaded = report.statistics.uploads.components();
         assert!(uploaded <= bytes, "{uploaded} bytes were uploaded, not {bytes}");
-        // Whatever changed, it is uploaded once.
+        // Every change is uploaded only once.
         let (_, report) = self.canvas.draw(&mut self.world, &linear());
         assert_eq!(report.statistics.uploads.components(), 0);
         report
@@ -91,7 +92,8 @@ impl Scene {
 
 #[test]
 fn a_frame_in_which_nothing_changed_uploads_nothing() {
-    // Of components, that is: the uniform of the frame (the camera, 144 bytes) is written every time and not counted.
+    // This concerns components: the uniform of the frame (the camera, 144 bytes) is written every time and not
+    // counted.
     let mut scene = scene();
     let (first, report) = scene.redrawn();
     assert_eq!(report.statistics.uploads.components(), 0);
@@ -105,10 +107,10 @@ fn a_moved_object_uploads_its_transform() {
     let mut scene = scene();
     scene.change(OBJECT, |scene| {
         let moved = scene.objects[34];
-        // Along the plane of the grid and so little that the order of the draws stays.
+        // In the plane of the grid, and so little that the order of the draws stays the same.
         scene.world.get_mut::<Transform>(moved).unwrap().translation.y += 0.02;
     });
-    // Far to the front: the order of the draws changes too, at most all of it.
+    // Far to the front, which can also change the order of all draws.
     scene.change(OBJECT + OBJECTS as u64 * INSTANCE, |scene| {
         let moved = scene.objects[34];
         scene.world.get_mut::<Transform>(moved).unwrap().translation.z += 2.0;
@@ -126,7 +128,7 @@ fn a_turned_light_and_a_dimmed_one_upload_themselves() {
         let light = scene.lights[4];
         scene.world.get_mut::<Light>(light).unwrap().diffuse = Vec3::new(0.1, 0.2, 3.0);
     });
-    // The first one switched off: those after it move up, and every list is one shorter.
+    // With the first light switched off, those after it move up and every list gets shorter by one.
     let rest = 4 * (LIGHT + INDEX) + OBJECTS as u64 * INSTANCE;
     scene.change(rest, |scene| {
         let light = scene.lights[0];
@@ -155,7 +157,7 @@ fn a_changed_material_uploads_itself() {
         let object = scene.objects[35];
         scene.world.entity_mut(object).remove::<MaterialTextures>();
     });
-    // Its technique is a matter of pipelines, not of bytes.
+    // The technique only changes pipelines, no data.
     scene.change(0, |scene| {
         let object = scene.objects[34];
         scene.world.entity_mut(object).insert(Shading::Flat);
@@ -185,7 +187,7 @@ fn despawned_hidden_and_spawned_objects() {
         let object = scene.objects[25];
         scene.world.entity_mut(object).insert(Hidden);
     });
-    // Back again, it is an object like a new one.
+    // When it is shown again, it counts as a new object.
     scene.change(instances + OBJECT + MATERIAL, |scene| {
         let object = scene.objects[25];
         scene.world.entity_mut(object).remove::<Hidden>();
@@ -201,7 +203,7 @@ fn despawned_hidden_and_spawned_objects() {
     assert_eq!(report.statistics.objects, OBJECTS);
 }
 
-/// What a renderer keeps of lights follows every way in which one may come, go, or become another.
+/// The renderer's data of lights follows every way in which a light can appear, disappear, or change.
 #[test]
 fn lights_that_come_and_go_and_change() {
     let mut scene = scene();
@@ -248,7 +250,7 @@ fn lights_that_come_and_go_and_change() {
         let at_fault = ["out of range", "nowhere", "not finite"].contains(&name);
         assert_eq!(report.left_out.len(), usize::from(at_fault), "{name}");
     }
-    // Settings reach lights that nobody has touched, and three with a range are found by clusters.
+    // Settings affect lights that have not changed, and the three with a range are found by clusters.
     for light in [0, 1, 3] {
         scene.world.get_mut::<Light>(scene.lights[light]).unwrap().attenuation = ranged(4.0);
     }
@@ -259,7 +261,7 @@ fn lights_that_come_and_go_and_change() {
         let (fresh, _) = draw(&mut scene.world, SIZE, SIZE, &linear());
         assert!(kept == fresh, "a threshold of {light_threshold}");
     }
-    // So far away that frame space has its origin at the camera.
+    // So far away that camera-relative space has its origin at the camera.
     let camera = scene.world.query_filtered::<Entity, With<Camera>>().single(&scene.world).unwrap();
     *scene.world.get_mut::<Transform>(camera).unwrap() =
         Transform::from_xyz(50.0, 40.0, 700.0).looking_at(DVec3::ZERO, DVec3::Y);
@@ -272,7 +274,7 @@ fn lights_that_come_and_go_and_change() {
 
 #[test]
 fn growing_beyond_every_buffer_keeps_what_was_there() {
-    // 60 objects have room for 64: 200 more make every buffer anew.
+    // There is room for 64 objects; another 200 make every buffer grow.
     let mut scene = scene();
     let mesh = scene.world.get::<Mesh>(scene.objects[0]).unwrap().clone();
     for number in 0..200 {

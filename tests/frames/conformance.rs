@@ -1,4 +1,5 @@
-//! OpenGL's fixed-function pictures, where they lie beside the checkout: Gouraud frames with `--display clamp` equal them.
+//! OpenGL's fixed-function pictures, if they are beside the checkout: Gouraud frames with `--display clamp` equal
+//! them.
 
 use bevy_ecs::world::World;
 use glam::DVec3;
@@ -9,19 +10,19 @@ use lumbre_tests::twin::{self, TwinOptions};
 use crate::adapter::draw;
 use crate::opengl::{equal, opengl_options};
 
-/// Cases that the folder holds.
+/// Number of cases in the folder.
 const CASES: usize = 6;
 
 #[test]
 fn gouraud_frames_equal_opengl() {
     for case in 0..CASES {
-        // Said aloud where it is missing.
+        // `shared_file` prints a message if the file is missing.
         let Some(model) = shared_file(&format!("conformance/opengl/case_{case}.glb")) else { return };
         let reference = image::open(model.with_extension("exr")).unwrap().to_rgb32f();
         let (width, height) = reference.dimensions();
         let mut world = World::new();
         lumbre_scene::load(&mut world, &model).unwrap();
-        // The pictures do not say which surface a pixel shows; the twin's rasterizer does.
+        // The pictures do not tell which surface a pixel shows; the twin's rasterizer does.
         let interior = twin::draw(&mut world, width as usize, height as usize, TwinOptions::default())
             .interior(false)
             .into_iter()
@@ -32,7 +33,7 @@ fn gouraud_frames_equal_opengl() {
         let difference = compare(&got.into_iter().map(Some).collect::<Vec<_>>(), &interior);
         let Difference { largest, mean, pixels, .. } = difference;
         println!("case {case}: largest {largest:.2e}, mean {mean:.2e} over {pixels} pixels");
-        // Edges take a few per cent.
+        // Edges are a few per cent of the pixels.
         assert!(pixels > interior.len() * 9 / 10, "case {case}: {pixels} pixels are too few to compare");
         assert!(equal(&difference), "case {case}: {difference:?}");
         // Both are f32 on the same kind of rasterizer: measured 1.9e-5 and 9.1e-8.

@@ -1,4 +1,5 @@
-//! Surfaces of one colour, without a light that shines on them from anywhere: their colour is made at the vertices, and no pixel differs from one that is shaded by itself.
+//! Surfaces of constant colour, on which no light with a direction shines: their colour is computed at the
+//! vertices, and no pixel differs from one that is shaded separately.
 
 use std::sync::Arc;
 
@@ -11,7 +12,8 @@ use lumbre_scene::{Camera, Mesh, SceneSettings, Transform};
 
 use crate::adapter::gpu;
 
-/// Balls that glow, take ambient light, both, or no light at all. A mask that cuts nothing out changes nothing, but each pixel has to be asked.
+/// Balls with emission, with ambient light, with both, or without any light. A mask that cuts nothing out changes
+/// nothing, but has to be evaluated for each pixel.
 fn scene(shading: Shading, masked: bool) -> World {
     let mut world = World::new();
     let mesh = Mesh(Arc::new(shapes::uv_sphere(0.45, 24, 12)));
@@ -60,7 +62,7 @@ fn a_colour_that_is_made_once_is_that_of_every_pixel() {
 
         let different = constant.iter().zip(&each).filter(|(one, other)| one != other).count();
         assert_eq!(different, 0, "{} {shading:?}: {variants} beside {shaded}", display.name());
-        // OpenGL's display clamps at the vertices, and interpolates what it has clamped.
+        // OpenGL's display clamps at the vertices and interpolates the clamped colours.
         if display != Display::Clamp || shading == Shading::Phong {
             let colors: std::collections::HashSet<String> =
                 constant.iter().map(|pixel| format!("{pixel}")).collect();

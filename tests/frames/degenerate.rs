@@ -1,5 +1,6 @@
-//! Scenes at the edge: nothing to see, nothing to see by, broken geometry, numbers that are none. Every frame is finite (the probe
-//! looks), nothing panics, wgpu's validation is silent, and what is whole looks as if the broken part were not there.
+//! Degenerate scenes: nothing visible, no light, broken geometry, numbers that are not finite. Every frame is
+//! finite (checked by the probe), nothing panics, wgpu's validation reports nothing, and the intact part looks as
+//! if the broken part were not there.
 
 use std::sync::Arc;
 
@@ -42,7 +43,7 @@ fn a_world_without_meshes_is_its_background() {
         assert!(pixels.iter().all(|pixel| *pixel == background.as_dvec3()), "{}", pixels[0]);
         assert!(!report.plan.status("forward").unwrap().runs());
     }
-    // A mesh without triangles is no more to see.
+    // A mesh without triangles is not visible either.
     world.spawn(Mesh(Arc::new(TriangleMesh::default())));
     let (pixels, _) = draw(&mut world, 5, 3, &linear());
     assert!(pixels.iter().all(|pixel| *pixel == background.as_dvec3()));
@@ -90,7 +91,7 @@ fn zero_normals_take_ambient_light_only() {
             let pixels = frame(&mut world, shading);
             assert!(pixels.iter().all(|pixel| *pixel == DVec3::splat(0.5 * 1.25)), "{}", pixels[0]);
         }
-        // Flat shading takes the face's normal, which is there: 0.5 * (1.25 + 1).
+        // Flat shading uses the face's normal, which exists: 0.5 * (1.25 + 1).
         let pixels = frame(&mut world, Shading::Flat);
         assert!(pixels.iter().all(|pixel| *pixel == DVec3::splat(0.5 * 2.25)), "{}", pixels[0]);
     }
@@ -101,7 +102,7 @@ fn triangles_without_area_are_not_seen() {
     let whole = lumbre_mesh::shapes::uv_sphere(1.0, 33, 16);
     let mut broken = whole.clone();
     let last = broken.positions.len() as u32 - 1;
-    // A point, an edge, and three points on a line.
+    // A point, an edge, and three collinear points.
     broken.indices.extend([0, 0, 0, 3, 3, last]);
     for x in [-1.0, 0.0, 1.0] {
         broken.indices.push(broken.positions.len() as u32);
@@ -117,7 +118,7 @@ fn triangles_without_area_are_not_seen() {
 
 #[test]
 fn a_light_in_the_surface_is_finite_and_agrees_with_the_twin() {
-    // Large enough that triangles have an inside, the only place where flat shading can be compared.
+    // Large enough for triangles to have an interior, the only place where flat shading can be compared.
     const LARGE: usize = 112;
     // At the middle of the ball's nearest patch, at one of its vertices, and at the eye.
     let vertex = lumbre_mesh::shapes::uv_sphere(1.0, 33, 16).positions[200].as_dvec3();
@@ -134,7 +135,7 @@ fn a_light_in_the_surface_is_finite_and_agrees_with_the_twin() {
             let expected = expected.inside_surfaces(*shading == Shading::Flat);
             let difference = compare(&got, &expected);
             assert!(difference.pixels > 30, "{} pixels are too few", difference.pixels);
-            // f32 against f64, as balls.rs has it.
+            // f32 compared with f64, as in balls.rs.
             assert!(difference.largest < 1e-4, "{place}, {}: {difference:?}", shading.name());
         }
     }
@@ -150,14 +151,14 @@ fn ten_thousand_lights_behind_the_camera_change_nothing() {
         world.spawn((Light { attenuation: range, ..Light::point(Vec3::splat(9.0)) }, place));
     }
     for (shading, before) in Shading::ALL.iter().zip(before) {
-        // To the bit: deferred shading rounds in its own way.
+        // Bit for bit; deferred shading rounds differently.
         let rendering_path = RenderingPath::Forward;
         let options = FrameOptions { shading: Some(*shading), rendering_path, ..linear() };
         let (after, report) = draw(&mut world, SIZE as u32, SIZE as u32, &options);
         assert_eq!((report.statistics.lights, report.statistics.lights_per_object), (10_001, 1.0));
         assert!(after == before, "{}", shading.name());
     }
-    // Negative control: in front of it, they are seen.
+    // Negative control: in front of the camera they are visible.
     let mut lights = world.query_filtered::<&mut Transform, With<Light>>();
     lights.iter_mut(&mut world).for_each(|mut place| place.translation.z -= 8.0);
     let by_objects = FrameOptions { light_lists: LightLists::Objects, ..linear() };
@@ -219,7 +220,7 @@ fn objects_that_are_nowhere_are_not_drawn() {
         let lost = world.spawn((mesh, material, place)).id();
         let mut canvas = Canvas::new(SIZE as u32, SIZE as u32);
         assert!(canvas.draw(&mut world, &linear()).0 == expected, "{place:?}");
-        // Found again, it is drawn: the ball is covered by a larger one.
+        // With a valid transform it is drawn again: the ball is covered by a larger one.
         world.entity_mut(lost).insert(Transform::IDENTITY.with_scale(DVec3::splat(1.2)));
         assert!(canvas.draw(&mut world, &linear()).0 != expected);
         world.entity_mut(lost).insert(place);
@@ -312,7 +313,7 @@ fn bad_cameras_are_named_with_the_field_and_the_value() {
     let lost = world.spawn((Camera::default(), Transform::from_xyz(nan, 0.0, 0.0))).id();
     let refused = canvas.refuse(&mut world, &linear());
     assert!(matches!(refused, RenderError::BadCamera { field: "translation", .. }), "{refused}");
-    // After all that the renderer still draws.
+    // After all these errors the renderer still draws.
     world.despawn(lost);
     world.spawn(orthographic());
     world.insert_resource(SceneSettings { ambient: Vec3::ONE, ..SceneSettings::default() });

@@ -1,4 +1,5 @@
-//! From radiance to the target's numbers: where nothing needs the linear frame there is no display pass, and the picture is the same.
+//! From radiance to display values: where nothing needs the linear frame there is no display pass, and the picture
+//! is the same.
 
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ use crate::adapter::gpu;
 
 const SIZE: u32 = 96;
 
-/// Balls from nearly black to far beyond white before a coloured background, in fog.
+/// Balls from nearly black to far brighter than white in front of a coloured background, in fog.
 fn scene(shading: Shading) -> World {
     let mut world = World::new();
     let mesh = Mesh(Arc::new(shapes::uv_sphere(0.45, 24, 12)));
@@ -37,7 +38,7 @@ fn scene(shading: Shading) -> World {
     world
 }
 
-/// A frame of eight bits, and whether it had a display pass.
+/// Draws a frame of eight bits, and returns whether it had a display pass.
 fn frame(world: &mut World, options: &FrameOptions) -> (Vec<u8>, bool) {
     let target = Offscreen::new(gpu(), SIZE, SIZE, OffscreenFormat::Rgba8).unwrap();
     let report = Renderer::new(gpu()).render(world, &target.target(), options).unwrap();
@@ -52,7 +53,7 @@ fn without_a_display_pass_the_picture_is_the_same() {
         let options = FrameOptions { display: *display, exposure: Some(0.7), ..FrameOptions::default() };
         let (folded, passed) = frame(&mut world, &options);
         assert!(!passed, "{}", display.name());
-        // The probe looks into the linear frame.
+        // The probe needs the linear frame.
         let (apart, passed) = frame(&mut world, &FrameOptions { probe: true, ..options });
         assert!(passed);
         let difference = folded.iter().zip(&apart).map(|(a, b)| a.abs_diff(*b)).max();
@@ -77,7 +78,7 @@ fn a_frame_without_a_display_pass_has_the_numbers_of_the_f64_twin() {
             let expected =
                 display_color(display, format, 0.7, radiance.truncate()).clamp(Vec3::ZERO, Vec3::ONE);
             for (byte, expected) in pixel.iter().zip(expected.to_array()) {
-                // Half a step of rounding, and f32's powers.
+                // Half a step of rounding, and the error of f32's powers.
                 assert!((f32::from(*byte) - 255.0 * expected).abs() < 0.52, "{pixel:?} {expected}");
             }
         }
@@ -95,7 +96,7 @@ fn what_needs_radiance_keeps_the_display_pass() {
     assert!(frame(&mut world, &FrameOptions::default()).1);
 }
 
-/// The bytes of a target whose format encodes sRGB by itself.
+/// Returns the bytes of a target whose format encodes sRGB itself.
 fn encoded(world: &mut World, options: &FrameOptions) -> Vec<u8> {
     let texture = gpu().device.create_texture(&wgpu::TextureDescriptor {
         label: None,
@@ -130,7 +131,7 @@ fn a_target_that_encodes_holds_the_same_bytes() {
     }
 }
 
-/// Rows of a part of a picture of eight bits.
+/// Returns a rectangle of a picture of eight bits.
 fn part(picture: &[u8], width: u32, [x, y]: [u32; 2], [columns, rows]: [u32; 2]) -> Vec<u8> {
     let row = |row: u32| {
         let first = 4 * (row * width + x) as usize;
@@ -144,7 +145,7 @@ fn a_viewport_holds_the_frame_and_what_is_around_it_is_kept_or_cleared() {
     let mut world = scene(Shading::Phong);
     let options = FrameOptions { exposure: Some(0.7), ..FrameOptions::default() };
     let (size, origin) = ([40, 64], [50, 20]);
-    // The frame by itself, with a display pass as in a viewport.
+    // The frame on its own, with a display pass as in a viewport.
     let alone = Offscreen::new(gpu(), size[0], size[1], OffscreenFormat::Rgba8).unwrap();
     let mut renderer = Renderer::new(gpu());
     renderer.render(&mut world, &alone.target(), &FrameOptions { probe: true, ..options.clone() }).unwrap();
@@ -167,7 +168,7 @@ fn a_viewport_holds_the_frame_and_what_is_around_it_is_kept_or_cleared() {
         assert!(inside || !changed(x, y), "{x}, {y}");
     }
 
-    // A still World in a viewport is kept; in another one it is drawn.
+    // An unchanged world in the same viewport is kept; in another viewport it is drawn.
     let kept = FrameOptions { keep_unchanged: true, ..options.clone() };
     let drawn = |renderer: &mut Renderer, world: &mut World, viewport: Viewport| {
         let report = renderer.render(world, &target.target().with_viewport(viewport), &kept).unwrap();

@@ -1,5 +1,5 @@
-//! Document [M]'s tables as frames: 2.1, one coefficient after the other, and 1.1, the three shadings on 990 polygons. Each against
-//! the twin and against values that are known without it.
+//! Document [M]'s tables as frames: 2.1, one coefficient after the other, and 1.1, the three shadings on 990
+//! polygons. Each is compared with the twin and with values that are known without it.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -20,8 +20,8 @@ use crate::adapter::{draw, linear};
 
 const SIZE: usize = 160;
 
-/// As balls.rs has it: f32 against f64, n (a few ulp) for the power, n = 100 at most here: 100 · 4 · 2^-24 = 2.4e-5, and the
-/// position's rounding times the slope of the highlight. Measured at most 2.4e-5.
+/// As in balls.rs, f32 compared with f64: n (a few ulp) for the power, with n = 100 at most here, 100 · 4 · 2^-24 =
+/// 2.4e-5, and the position's rounding times the slope of the highlight. Measured at most 2.4e-5.
 const LARGEST: f64 = 1e-4;
 
 fn frame(world: &mut World) -> Vec<DVec3> {
@@ -46,7 +46,7 @@ fn table_2_1_agrees_with_the_twin() {
             println!("table 2.1, row {row}, column {column}: {difference:?}");
             assert!(difference.pixels > SIZE * SIZE / 2, "{difference:?}");
             assert!(difference.largest < LARGEST, "row {row}, column {column}: {difference:?}");
-            // Negative control: the cell beside it.
+            // Negative control: the neighbouring cell.
             let beside = frame(&mut table_2_1(row, (column + 1) % 3));
             let wrong = compare(&beside.into_iter().map(Some).collect::<Vec<_>>(), &expected);
             assert!(wrong.largest > 0.05, "row {row}: column {column} looks like the next");
@@ -59,7 +59,7 @@ fn the_plain_ambient_ball_is_everywhere_the_same_and_exactly_k_a_i_a() {
     // "No se observa tridimensionalidad": one colour, whatever the normal.
     let surface = twin_of(&mut table_2_1(0, 0)).inside_surfaces(false);
     for (column, ambient) in AMBIENT.into_iter().enumerate() {
-        // Products of few digits: f32 has them exactly.
+        // Products of numbers with few binary digits, which are exact in f32.
         let expected = (COLOR * ambient * AMBIENT_LIGHT).as_dvec3();
         assert_eq!(expected, COLOR.as_dvec3() * f64::from(ambient) * f64::from(AMBIENT_LIGHT));
         let pixels = frame(&mut table_2_1(0, column));
@@ -71,7 +71,8 @@ fn the_plain_ambient_ball_is_everywhere_the_same_and_exactly_k_a_i_a() {
     }
 }
 
-/// The scene seen along parallel rays, by a viewer infinitely far away, its ball finer: the pixel's place is the normal.
+/// Changes a scene to an orthographic camera and an infinitely distant viewer, with a finer ball, so that a pixel's
+/// position determines the normal.
 fn from_afar(mut world: World) -> World {
     let mut cameras = world.query::<(&mut Camera, &mut Transform)>();
     for (mut camera, mut place) in cameras.iter_mut(&mut world) {
@@ -86,7 +87,7 @@ fn from_afar(mut world: World) -> World {
     world
 }
 
-/// The exact normals of the pixels of such a frame that are not near the rim.
+/// Returns the exact normals of the pixels of such a frame that are not near the rim.
 fn normals() -> Vec<Option<DVec3>> {
     let at = |index: usize| (2 * index + 1) as f64 / SIZE as f64 - 1.0;
     let normal = |index: usize| {
@@ -97,8 +98,9 @@ fn normals() -> Vec<Option<DVec3>> {
     (0..SIZE * SIZE).map(normal).collect()
 }
 
-/// What the mesh's normals are off by at most at such a pixel, in radians: a facet of diagonal h = 2π/512 · √2 lies h²/8 below the
-/// sphere, and the interpolated normal is that of the facet's point, seen h²/8 · tan θ aside of its own, tan θ ≤ 2.07.
+/// Largest error of the mesh's normals at such a pixel, in radians: a facet with the diagonal h = 2π/512 · √2 is up
+/// to h²/8 below the sphere, and its interpolated normal is that of a point up to h²/8 · tan θ away, with tan θ ≤
+/// 2.07.
 const NORMAL: f64 = 0.0174 * 0.0174 / 8.0 * 2.07;
 
 #[test]
@@ -122,7 +124,7 @@ fn the_diffuse_part_is_lamberts_cosine_and_the_same_in_every_column() {
                 assert_eq!(added, DVec3::ZERO, "light from behind");
             }
         }
-        // Where the normal meets the light: k_d I_p O_d, but for half a pixel.
+        // Where the normal points to the light: k_d I_p O_d, up to half a pixel.
         let full = COLOR.as_dvec3() * f64::from(DIFFUSE) * f64::from(LIGHT);
         assert!((brightest - full).abs().max_element() < 1e-4, "{brightest} is not {full}");
         assert!(dark > 100, "only {dark} pixels lie in the dark");
@@ -131,23 +133,24 @@ fn the_diffuse_part_is_lamberts_cosine_and_the_same_in_every_column() {
 
 #[test]
 fn highlights_have_the_peak_and_the_half_width_of_their_exponent() {
-    // By the infinite viewer r.v depends on the normal alone: r.v = 2 (n.l)(n.v) - l.v, 1 where n is h.
+    // With the infinite viewer r.v depends on the normal alone: r.v = 2 (n.l)(n.v) - l.v, which is 1 where n is h.
     let (light, viewer) = (toward_light(), DVec3::Z);
     let half_vector = (light + viewer).normalize();
     let peak = f64::from(SPECULAR) * f64::from(LIGHT);
-    // Across the plane of l and v, and along it.
+    // Directions across the plane of l and v, and within it.
     let across = light.cross(viewer).normalize();
     let along = across.cross(half_vector);
     for (column, exponent) in EXPONENTS.into_iter().enumerate() {
         let n = f64::from(exponent);
         let diffuse = frame(&mut from_afar(table_2_1(1, column)));
         let specular = frame(&mut from_afar(table_2_1(2, column)));
-        // cos^n = 1/2 at this angle between r and v.
+        // cos^n is 1/2 at this angle between r and v.
         let half = 0.5f64.powf(1.0 / n).acos();
-        // In the plane of l and v the normal turns r by twice its own angle; across it r.v = cos^2 a (1 + l.v) - l.v.
+        // In the plane of l and v the normal turns r by twice its own angle; across it r.v = cos^2 a (1 + l.v) -
+        // l.v.
         let half_along = 0.5 * half;
         let half_across = ((half.cos() + light.dot(viewer)) / (1.0 + light.dot(viewer))).sqrt().acos();
-        // Slope of cos^n: at most sqrt(n/e) a radian, and r turns by twice what the normal does.
+        // The slope of cos^n is at most sqrt(n/e) per radian, and r turns by twice as much as the normal.
         let slope = peak * (n / std::f64::consts::E).sqrt() * 2.0;
         let (mut brightest, mut widest, mut nearest) = (0.0f64, 0.0f64, f64::INFINITY);
         let (mut width_along, mut width_across) = (0.0f64, 0.0f64);
@@ -182,13 +185,16 @@ fn highlights_have_the_peak_and_the_half_width_of_their_exponent() {
             half_along.to_degrees(),
             half_across.to_degrees()
         );
-        // Half a pixel's diagonal, foreshortened: so far may the peak be from the next centre.
+        // Half a pixel's diagonal, foreshortened, which is the largest distance of the peak from the nearest pixel
+        // centre.
         let pixel = 0.5f64.sqrt() * 2.0 / SIZE as f64 / half_vector.z;
         assert!(brightest <= peak * (1.0 + 1e-6) && brightest > peak * (2.0 * pixel).cos().powf(n) - 1e-5);
-        // Pixels on either side of the half are told apart by their normals, whatever the pixels' size.
+        // Pixels on either side of the half value are distinguished by their normals, so the size of a pixel does
+        // not matter.
         assert!(widest < half + 2.0 * NORMAL + 1e-5, "n = {n}: {widest} is beyond {half}");
         assert!(nearest > half - 2.0 * NORMAL - 1e-5, "n = {n}: {nearest} is within {half}");
-        // The lit patch is as wide as that, but for pixels: up to the rim's foreshortening, 1 / cos 35 degrees.
+        // The width of the lit patch agrees up to the pixels' size, with foreshortening at the rim of up to 1 / cos
+        // 35 degrees.
         let apart = (width_along - half_along).abs().max((width_across - half_across).abs());
         assert!(
             apart < 2.0 * pixel,
@@ -246,7 +252,8 @@ fn flat_polygons_have_one_colour_and_the_smooth_shadings_many() {
 
 #[test]
 fn phong_keeps_the_highlight_that_gouraud_and_flat_lose_between_vertices() {
-    // The highlight's peak is known: k_s I_p, over the ambient and the diffuse light there; the local viewer is 6 radii away.
+    // The highlight's peak is known: k_s I_p plus the ambient and diffuse light there; the local viewer is 6 radii
+    // away.
     let brightest = |shading| frame(&mut table_1_1(shading)).iter().map(|pixel| pixel.y).fold(0.0, f64::max);
     let (flat, gouraud, phong) =
         (brightest(Shading::Flat), brightest(Shading::Gouraud), brightest(Shading::Phong));

@@ -1,6 +1,8 @@
-//! Only what is called for, to the last instruction: every effect that the renderer knows, each with a scene that calls for it and the same scene without it. Without it no pass runs for it,
-//! no shader has a feature, function or binding of it, nothing is uploaded for it, its modules need not exist, and the frame's bits are those of a renderer that never met it. The table that
-//! comes of this is docs/effects.md, line by line but for the times.
+//! Checks that only what is needed exists, for every effect that the renderer knows, each with a scene that calls
+//! for it and the same scene without it. Without the effect no pass runs for it, no shader contains a feature,
+//! function or binding of it, nothing is uploaded for it, its modules need not exist, and the frame is bit for bit
+//! that of a renderer that never had it. The resulting table is docs/effects.md, which must agree line by line
+//! except for the times.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -31,14 +33,14 @@ use super::own_effects::bloom::{Bloom, BloomEffect};
 use super::own_effects::outline::{OutlineEffect, Outlined};
 use crate::adapter::gpu;
 
-/// Pixels along the side of the frames.
+/// Side length of the frames in pixels.
 const SIZE: u32 = 96;
-/// Frames that a time is the median of.
+/// Number of frames over which the median of a time is taken.
 const TIMED: usize = 5;
-/// Cells of a row that are the same on every machine; the times after them are not.
+/// Number of cells of a row that are the same on every machine; the times after them are not.
 const LASTING: usize = 6;
 
-/// A scene on its way: a ball before a camera, and what the frame is asked for.
+/// A scene under construction: a ball in front of a camera, and the options of the frame.
 struct Scene {
     world: World,
     ball: Entity,
@@ -47,19 +49,19 @@ struct Scene {
     format: OffscreenFormat,
 }
 
-/// One effect.
+/// One effect of the table.
 struct Row {
-    /// As a line of the census names it, where there is one.
+    /// Its name in the census, if it has one there.
     effect: &'static str,
     called_for_by: &'static str,
-    /// What is in a shader's variant with it and not without it. None for passes of their own.
+    /// Features of a shader variant with the effect and not without it; none for separate passes.
     features: &'static [&'static str],
-    /// What stands in the scene already, with the effect and without.
+    /// Prepares the scene, with the effect and without.
     before: fn(&mut Scene),
     add: fn(&mut Scene),
 }
 
-/// A matt ball, shaded by Phong, with everything that a lightmap and textures want of a mesh; no light.
+/// A matt ball under Phong shading, whose mesh has everything that a lightmap and textures need; no light.
 fn scene() -> Scene {
     let mut ball = shapes::uv_sphere(1.0, 24, 12);
     ball.uv1.clone_from(&ball.uv0);
@@ -67,7 +69,7 @@ fn scene() -> Scene {
     let ball = world.spawn((Mesh(Arc::new(ball)), Material::matt(Vec3::splat(0.6)))).id();
     let camera = world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 3.5))).id();
     world.insert_resource(SceneSettings { ambient: Vec3::splat(0.1), ..SceneSettings::default() });
-    // Whatever draws.
+    // Forward shading for all scenes.
     let options = FrameOptions { rendering_path: RenderingPath::Forward, ..FrameOptions::default() };
     Scene { world, ball, camera, options, format: OffscreenFormat::Rgba8 }
 }
@@ -91,7 +93,7 @@ fn cone() -> Light {
     Light::spot(Vec3::splat(9.0), SpotCone::Smooth { inner: 0.1, outer: 0.4 })
 }
 
-/// A light that ends after some metres.
+/// A light with a range of some metres.
 fn ranged(light: Light) -> Light {
     Light { attenuation: Attenuation { range: 20.0, ..light.attenuation }, ..light }
 }
@@ -113,13 +115,13 @@ fn texture() -> lumbre_scene::TextureReference {
     sharp(&image(2, &[[200, 128, 255, 255], [90, 128, 255, 255], [128, 200, 255, 255], [128, 90, 255, 255]]))
 }
 
-/// A small ball between the other one and its light.
+/// Adds a small ball between the other one and its light.
 fn occluder(scene: &mut Scene) {
     let small = Mesh::from(shapes::uv_sphere(0.2, 12, 6));
     scene.world.spawn((small, Material::matt(Vec3::splat(0.6)), Transform::from_xyz(0.4, 0.8, 1.6)));
 }
 
-/// A point light on a ball with a highlight.
+/// Adds a point light, and a highlight to the ball.
 fn glossy(scene: &mut Scene) {
     point_light(scene);
     material(scene, |material| {
@@ -512,7 +514,7 @@ const ROWS: &[Row] = &[
         effect: "two-sided",
         called_for_by: "a double-sided material where the scene lights both sides",
         features: &["TWO_SIDED"],
-        // From inside the ball.
+        // Seen from inside the ball.
         before: |scene| {
             point_light(scene);
             settings(scene, |settings| settings.two_sided = false);
@@ -594,7 +596,7 @@ const ROWS: &[Row] = &[
         called_for_by: "`Display::Clamp`",
         features: &["CLAMP", "DISPLAY_CLAMP"],
         before: |scene| {
-            // A colour above 1 is told from 1 by what is mixed with it.
+            // Fog mixed in shows the difference between a colour above 1 and one clamped to 1.
             spawn(scene, Light::point(Vec3::splat(90.0)));
             fog(scene, FogMode::Exponential { density: 0.1 });
             scene.options.display = Display::Linear;
@@ -646,7 +648,7 @@ const ROWS: &[Row] = &[
     },
 ];
 
-/// Lines of the census that are no work of their own within a frame, each with what they come to.
+/// Lines of the census that cause no work of their own in a frame, each with what it amounts to.
 const NO_EFFECT: &[(&str, &str)] = &[
     ("meshes", "what is drawn at all"),
     ("shading by need", "one of the shadings above, chosen on the CPU"),
@@ -665,7 +667,7 @@ const NO_EFFECT: &[(&str, &str)] = &[
     ("static objects", "for the baker"),
 ];
 
-/// Features that have no scene of their own here, each with the reason.
+/// Features that have no scene here, each with the reason.
 const NO_SCENE: &[(&str, &str)] = &[
     ("AMBIENT_LIGHTS", "never: ambient lights are summed before the frame"),
     ("LIT", "what an unlit material leaves out"),
@@ -683,13 +685,13 @@ fn each_light(scene: &mut Scene, change: impl Fn(&mut Light)) {
     scene.world.query::<&mut Light>().iter_mut(&mut scene.world).for_each(|mut light| change(&mut light));
 }
 
-/// What a frame was made of.
+/// What a frame consisted of.
 struct Drawn {
     bytes: Vec<u8>,
     passes: Vec<String>,
     variants: Vec<String>,
     report: FrameReport,
-    /// Median of some frames, each waited for.
+    /// Median time of several frames, each of which was waited for.
     milliseconds: f64,
 }
 
@@ -715,7 +717,7 @@ fn draw(renderer: &mut Renderer, scene: &mut Scene) -> Drawn {
     Drawn { bytes, passes, variants, report, milliseconds: times[TIMED / 2] }
 }
 
-/// The WGSL of a variant, from the modules whose path `is_there`.
+/// Returns the WGSL of a variant, from the modules whose path satisfies `is_there`.
 fn wgsl(variant: &str, is_there: impl Fn(&str) -> bool) -> String {
     let modules: Vec<_> = MODULES
         .iter()
@@ -736,22 +738,22 @@ fn wgsl(variant: &str, is_there: impl Fn(&str) -> bool) -> String {
     }
 }
 
-/// The declarations of a program, whose order the compiler leaves open.
+/// Returns the declarations of a program as a set, because the compiler does not fix their order.
 fn declarations(wgsl: &str) -> BTreeSet<&str> {
     wgsl.split("\n\n").map(str::trim).collect()
 }
 
-/// What stands in the shaders of some variants.
+/// The contents of the shaders of some variants.
 #[derive(Default)]
 struct Contents {
-    /// WESL modules that something in them comes from.
+    /// WESL modules from which anything in them comes.
     modules: BTreeSet<&'static str>,
     /// Group, binding and name of what is bound.
     bindings: BTreeSet<(u32, u32, String)>,
 }
 
-/// The module that a name in WGSL comes from, with its name there: the compiler writes `package`, the path and the name, joined by underscores, each part with the number of
-/// its own underscores before it.
+/// Returns the module that a name in WGSL comes from, with its name there. The compiler joins `package`, the path
+/// and the name with underscores, and puts the number of its own underscores in front of each part.
 fn origin(name: &str) -> Option<(&'static str, String)> {
     let escaped = |part: &str| match part.matches('_').count() {
         0 => part.to_owned(),
@@ -772,7 +774,7 @@ fn contents(variants: &[String]) -> Contents {
     for variant in variants {
         let source = wgsl(variant, |_| true);
         let module = naga::front::wgsl::parse_str(&source).unwrap();
-        // Types and constants too, which are no instructions but come from somewhere.
+        // Types and constants too, which are not instructions but come from a module.
         let names = source.split(|letter: char| !(letter.is_ascii_alphanumeric() || letter == '_'));
         contents.modules.extend(names.filter_map(|name| Some(origin(name)?.0)));
         for (_, global) in module.global_variables.iter() {
@@ -789,7 +791,7 @@ fn words(variants: &[String]) -> BTreeSet<&str> {
     variants.iter().flat_map(|variant| variant.split(' ')).collect()
 }
 
-/// Both frames of a row compared; its line of the table.
+/// Compares both frames of a row and returns its line of the table.
 fn line(row: &Row) -> String {
     let without = || {
         let mut scene = scene();
@@ -802,12 +804,13 @@ fn line(row: &Row) -> String {
     let plain = draw(&mut Renderer::new(gpu()), &mut without());
     let mut renderer = renderer();
     let effect = draw(&mut renderer, &mut with);
-    // Lists of lights and deferred shading are other ways to the same picture, and what counts draws the same one.
+    // Lists of lights and deferred shading lead to the same picture in another way, and counting does not change
+    // it.
     let same_picture =
         ["CLUSTERS", "COUNT_LIGHTS", "DEFERRED"].iter().any(|feature| row.features.contains(feature));
     let shown = effect.bytes != plain.bytes || same_picture;
     assert!(shown, "{}: the scene does not show it", row.effect);
-    // What is left of it in a renderer that has drawn it, and in one that knows it and never did.
+    // What remains of the effect in a renderer that has drawn it, and in one that has it but never drew it.
     let after = draw(&mut renderer, &mut without());
     let beside = draw(&mut self::renderer(), &mut without());
     for (what, other) in [("after it", &after), ("beside it", &beside)] {
@@ -815,7 +818,7 @@ fn line(row: &Row) -> String {
         assert_eq!(other.passes, plain.passes, "{}: other passes {what}", row.effect);
         assert_eq!(other.variants, plain.variants, "{}: other shaders {what}", row.effect);
     }
-    // A renderer that is built without the effects that have nothing to do here draws the same.
+    // A renderer without the effects that have nothing to do here draws the same.
     let idle =
         BuiltIn::ALL.into_iter().filter(|effect| !plain.passes.iter().any(|pass| pass == effect.name()));
     let smaller = idle.fold(Renderer::builder(), |builder, effect| builder.without(effect));
@@ -831,9 +834,9 @@ fn line(row: &Row) -> String {
     }
     let (has, had) = (contents(&effect.variants), contents(&plain.variants));
     let modules = has.modules.difference(&had.modules).copied();
-    // The root of other variants has no path in names, and is imported where deferred shading is the root.
+    // The root module of other variants has no path in names, and is imported where deferred shading is the root.
     let modules: Vec<_> = modules.filter(|module| *module != "forward").collect();
-    // The frame is that of a renderer without its modules: its shaders are, to the letter.
+    // The frame is that of a renderer without these modules, as its shaders are textually the same.
     for variant in &plain.variants {
         let built_without = wgsl(variant, |path| !modules.contains(&path));
         let same = declarations(&built_without) == declarations(&wgsl(variant, |_| true));
@@ -856,12 +859,12 @@ fn line(row: &Row) -> String {
         listed(code(modules)),
         bytes(&effect) as i64 - bytes(&plain) as i64,
         effect.milliseconds,
-        // By a renderer of the same effects.
+        // Drawn by a renderer with the same effects.
         beside.milliseconds,
     )
 }
 
-/// The cells of a line that do not depend on the machine.
+/// Returns the cells of a line that do not depend on the machine.
 fn lasting(line: &str) -> Vec<&str> {
     line.trim_matches('|').split('|').map(str::trim).take(LASTING).collect()
 }
@@ -897,7 +900,7 @@ fn the_table_has_every_effect_and_every_feature() {
         let excused = NO_EFFECT.iter().any(|(effect, _)| *effect == line.effect);
         assert!(rows.contains(line.effect) != excused, "{} has no scene here, or two places", line.effect);
     }
-    // What any of the shaders asks for.
+    // All features that any shader tests.
     let mut asked = BTreeSet::new();
     for (_, source) in MODULES {
         for condition in source.split("@if").skip(1) {

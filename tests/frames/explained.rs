@@ -1,5 +1,5 @@
-//! One truth about a scene: on random Worlds the passes and shader variants that `explain` names without a device are those that a frame draws, and an effect that it
-//! says is not called for is in no shader.
+//! On random worlds the passes and shader variants that `explain` predicts without a device are those that a frame
+//! draws, and an effect that it reports as not called for is in no shader.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ use lumbre_tests::panes::{image, sharp};
 
 use crate::adapter::gpu;
 
-/// Numbers that are the same in every run.
+/// A pseudo-random generator that gives the same numbers in every run.
 struct Random(u64);
 
 impl Random {
@@ -98,7 +98,7 @@ fn random_textures(random: &mut Random) -> MaterialTextures {
     }
 }
 
-/// A handful of balls in view, with whatever components may meet.
+/// A few visible balls with random components.
 fn random_world(random: &mut Random) -> World {
     let mut world = World::new();
     let lightmap = Arc::new(LightmapImage {
@@ -141,7 +141,7 @@ fn random_world(random: &mut Random) -> World {
     }
     if random.once_in(3) {
         let cubes = vec![AmbientCube([Vec3::splat(0.3); 6]); random.one_of(&[1, 2])];
-        // Of two cubes for one cell nothing can be made.
+        // Two cubes for one cell are invalid.
         world.spawn((
             IrradianceVolume { resolution: UVec3::ONE, cubes, inside: Vec::new() },
             Transform::IDENTITY,
@@ -202,7 +202,8 @@ fn what_is_explained_is_what_is_drawn() {
             explained.variants.keys().any(|variant| variant.split(' ').any(|word| word == feature))
         };
         for line in explained.census.lines() {
-            // Of an effect whose feature every object of it has, and of those that lights or options may leave without use.
+            // The feature of an effect, and whether every object with the effect has it, or lights or options may
+            // make it unused.
             let (feature, always) = match line.effect {
                 "fog" => ("FOG", true),
                 "vertex colours" => ("VERTEX_COLOR", true),
@@ -231,13 +232,13 @@ fn what_is_explained_is_what_is_drawn() {
         passes_seen.extend(drawn.into_iter().map(str::to_owned));
         variants_seen.extend(explained.variants.into_keys());
     }
-    // The Worlds were as different as they were meant to be.
+    // Checks that the worlds were sufficiently different.
     assert!(passes_seen.len() >= 5, "{passes_seen:?}");
     assert!(variants_seen.len() > 50, "{} variants", variants_seen.len());
     assert!(called_for.values().all(|count| *count > 0), "{called_for:?}");
 }
 
-/// Changes a component or a place in the hierarchy of some object or light.
+/// Changes a component of some object or light, or its place in the hierarchy.
 fn change(random: &mut Random, world: &mut World) {
     let objects: Vec<Entity> = world.query_filtered::<Entity, With<Mesh>>().iter(world).collect();
     let lights: Vec<Entity> = world.query_filtered::<Entity, With<Light>>().iter(world).collect();
@@ -279,7 +280,7 @@ fn change(random: &mut Random, world: &mut World) {
             world.entity_mut(light).insert(random_light(random));
         }
         (11, _) if objects.len() > 1 => entity.despawn(),
-        // Below something that may be hidden.
+        // Makes it a child of an object that may be hidden.
         (_, _) if other.is_some_and(|other| other > object) => {
             entity.insert(ChildOf(other.unwrap_or(object)));
         }

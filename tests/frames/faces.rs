@@ -1,4 +1,4 @@
-//! Fronts and backs: which faces are drawn, with which normal and which material they are lit.
+//! Fronts and backs: which faces are drawn, and with which normal and material they are lit.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
@@ -14,12 +14,12 @@ use crate::adapter::{draw, linear};
 
 const SIZE: usize = 112;
 
-/// f32 against f64, as balls.rs has it.
+/// f32 compared with f64, as in balls.rs.
 const LARGEST: f64 = 1e-4;
 
 /// A ball whose front is cut away, so that the camera sees its rim from outside and its hollow from inside.
 fn bowl() -> TriangleMesh {
-    // Polygons large enough that each has an inside, the only place where flat shading can be compared.
+    // Polygons large enough to have an interior, the only place where flat shading can be compared.
     let mut mesh = shapes::uv_sphere(1.0, 16, 10);
     let kept: Vec<u32> = mesh
         .triangles()
@@ -72,7 +72,7 @@ fn fronts_and_backs_agree_with_the_twin() {
 
 #[test]
 fn the_three_ways_to_see_a_back_differ() {
-    // Negative control of the test above: its three cases are three pictures.
+    // Negative control of the test above: its three cases give three different pictures.
     let mut frames = Vec::new();
     for (double_sided, two_sided) in [(true, true), (true, false), (false, true)] {
         frames.push(draw(&mut bowl_scene(double_sided, two_sided), SIZE as u32, SIZE as u32, &linear()).0);
@@ -96,7 +96,7 @@ fn the_back_of_a_single_sided_pane_is_not_there() {
     assert!(color(&mut world).iter().all(|pixel| *pixel == background.as_dvec3()));
     world.get_mut::<Material>(pane).unwrap().double_sided = true;
     assert!(color(&mut world).iter().all(|pixel| *pixel == DVec3::splat(0.5)));
-    // Mirrored as well as turned, its front is what is seen.
+    // Mirrored and not turned, its front is visible.
     world.get_mut::<Material>(pane).unwrap().double_sided = false;
     let mut mirrored = *world.get::<Transform>(pane).unwrap();
     mirrored.rotation = glam::DQuat::IDENTITY;

@@ -1,5 +1,5 @@
-//! Flat shading by each rule: the centroid and the face's normal of document [M], the first vertex of document [I], the last
-//! vertex of OpenGL.
+//! Flat shading with each rule: the centroid and the face's normal of document [M], the first vertex of document
+//! [I], the last vertex of OpenGL.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use lumbre_tests::twin::{self, TwinOptions};
 use crate::adapter::{draw, linear};
 
 const SIZE: usize = 256;
-/// As the ball's: f32 against f64.
+/// The bound of balls.rs: f32 compared with f64.
 const LARGEST: f64 = 1e-4;
 
 fn options(rule: Option<FlatRule>) -> FrameOptions {
@@ -50,7 +50,7 @@ fn every_rule_agrees_with_the_twin() {
     assert!(frames[0] != frames[2] && frames[2] != frames[4], "the rules draw the same frame");
 }
 
-/// One triangle whose vertices face three ways and have three colours, under a light of 1 from the viewer's side.
+/// One triangle whose vertices have three different normals and colours, under a light of 1 from the viewer's side.
 fn triangle() -> World {
     let mut world = World::new();
     let tilted = |degrees: f32| Vec3::new(degrees.to_radians().sin(), 0.0, degrees.to_radians().cos());
@@ -87,10 +87,10 @@ fn a_polygon_takes_the_light_and_the_colour_of_its_rule() {
         world.insert_resource(SceneSettings { flat_rule: rule, ..SceneSettings::default() });
         let (by_scene, _) = draw(&mut world, 16, 16, &options(None));
         for pixels in [by_caller, by_scene] {
-            // The middle and a pixel beside it, in another part of the triangle.
+            // The middle pixel and a neighbour in another part of the triangle.
             for pixel in [pixels[8 * 16 + 8], pixels[9 * 16 + 7]] {
                 let apart = (pixel - expected).abs().max_element();
-                // Normals rounded to f32, normalized again: a few roundings.
+                // Normals are rounded to f32 and normalized again: a few roundings.
                 assert!(apart < 1e-6, "{}: {pixel} is not {expected}", rule.name());
             }
         }

@@ -1,4 +1,5 @@
-//! What a scene asks of its frames: samples, where lamps end, how shadow maps are read and how many texels they have. Each does what it says, and nothing where it is not asked for.
+//! The settings of a scene for its frames: samples, where lamps end, the filter and resolution of shadow maps. Each
+//! has its effect, and no effect if it is not set.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
@@ -10,13 +11,13 @@ use lumbre_scene::{Camera, FrameSettings, Mesh, Projection, SceneSettings, Shado
 use crate::adapter::{draw, linear};
 
 const SIZE: u32 = 128;
-/// Half the side of the floor that is seen, in metres.
+/// Half the side of the visible floor, in metres.
 const HALF: f64 = 3.0;
 const BALL: DVec3 = DVec3::new(0.0, 1.0, 0.0);
 const RADIUS: f64 = 0.5;
 const LAMP: DVec3 = DVec3::new(1.2, 4.0, 0.7);
 
-/// A matt ball over a floor, seen straight from above, under this lamp.
+/// A matt ball over a floor, seen from straight above, under this lamp.
 fn ball_and_floor(lamp: Light) -> World {
     let mut world = World::new();
     world.insert_resource(SceneSettings::default());
@@ -44,7 +45,8 @@ fn ask(world: &mut World, frame: FrameSettings) {
     world.resource_mut::<SceneSettings>().frame = frame;
 }
 
-/// The part of the lamp's light that reaches each point of the floor; nothing where the ball is seen, or no light arrives in any case.
+/// Returns the fraction of the lamp's light that reaches each point of the floor; `None` where the ball is visible
+/// or no light would arrive anyway.
 fn lit(world: &mut World, frame: FrameSettings) -> Vec<Option<f64>> {
     ask(world, frame);
     let options = FrameOptions { shading: Some(Shading::Phong), ..linear() };
@@ -63,7 +65,7 @@ fn point(index: usize) -> DVec3 {
     DVec3::new(along(index % SIZE as usize) * HALF, 0.0, along(index / SIZE as usize) * HALF)
 }
 
-/// 0 where the ball hides the lamp's middle from the floor, else 1.
+/// Returns 0 where the ball hides the lamp's centre from the floor, else 1.
 fn by_ray(index: usize, lamp: &Light) -> f64 {
     let place = point(index);
     let distant = lamp.kind == LightKind::Directional;
@@ -73,7 +75,7 @@ fn by_ray(index: usize, lamp: &Light) -> f64 {
     if (place + toward * along).distance(BALL) < RADIUS { 0.0 } else { 1.0 }
 }
 
-/// The mean difference from shadow rays.
+/// Returns the mean difference from shadow rays.
 fn off(lit: &[Option<f64>], lamp: &Light) -> f64 {
     let apart = lit.iter().enumerate().filter_map(|(at, lit)| Some((lit.as_ref()? - by_ray(at, lamp)).abs()));
     apart.sum::<f64>() / lit.len() as f64
@@ -95,7 +97,7 @@ fn hard_shadows_are_all_or_nothing_and_others_are_not() {
         assert!(hard.iter().flatten().all(|lit| lit.abs() < 1e-6 || (lit - 1.0).abs() < 1e-6), "{lamp:?}");
         let closer = filtered(&mut world, ShadowFilter::PercentageCloser);
         assert!(between(&closer) > 20, "{lamp:?}: {} points lie between", between(&closer));
-        // Away from the edge both are what the ray says.
+        // Away from the edge both agree with the rays.
         let apart = hard.iter().zip(&closer).filter(|(a, b)| a.is_some() && a != b).count();
         assert!(apart > 20 && apart < 800, "{lamp:?}: {apart} points differ");
     }
@@ -126,7 +128,7 @@ fn more_texels_are_nearer_to_rays() {
         };
         let [coarse, usual, fine] = [0.125, 1.0, 4.0].map(|resolution| error(&mut world, resolution));
         assert!(fine < 0.8 * coarse && fine <= usual && usual <= coarse, "{lamp:?}: {coarse} {usual} {fine}");
-        // Numbers beyond the range are those at its ends, and none at all is the usual one.
+        // Numbers beyond the range are clamped to it, and NaN gives the default.
         assert_eq!(error(&mut world, 100.0), fine);
         assert_eq!(error(&mut world, f32::NAN), usual);
     }
@@ -145,7 +147,7 @@ fn lamps_end_by_the_threshold_as_by_a_range_of_their_own() {
     let apart = |a: &[DVec3], b: &[DVec3]| {
         a.iter().zip(b).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f64::max)
     };
-    // The root of 25 to f32.
+    // The square root of 25 in f32.
     assert!(apart(&ended, &ranged) < 1e-6, "{}", apart(&ended, &ranged));
     assert!(apart(&endless, &ranged) > 0.01, "the range shows nowhere");
     ask(&mut world, FrameSettings::default());

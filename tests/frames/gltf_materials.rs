@@ -1,5 +1,6 @@
-//! glTF's metallic-roughness materials beside the reflectance that the specification states (glTF 2.0, appendix B), written here by itself:
-//! balls over roughness and metalness under one point light, in every reflection model.
+//! glTF's metallic-roughness materials compared with the reflectance that the specification defines (glTF 2.0,
+//! appendix B), which is implemented independently here: balls over roughness and metalness under one point light,
+//! in every reflection model.
 
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
@@ -17,14 +18,14 @@ use crate::adapter::{draw, linear};
 const ROUGHNESS: [f64; 6] = [0.15, 0.3, 0.45, 0.6, 0.8, 1.0];
 const METALLIC: [f64; 3] = [0.0, 0.5, 1.0];
 const BASE: DVec3 = DVec3::new(0.8, 0.3, 0.2);
-/// Candela.
+/// Intensity of the lamp in candela.
 const INTENSITY: f64 = 400.0;
 const LAMP: DVec3 = DVec3::new(4.0, 6.0, 12.0);
 const RADIUS: f64 = 0.9;
-/// Pixels along a side of a ball's square, which is 2 m.
+/// Side length in pixels of a ball's square, which is 2 m.
 const PIXELS: usize = 64;
-/// Squared distance from the middle of a ball's picture, in radii, up to which it is compared: to 76 degrees. Beyond, one pixel holds many
-/// directions.
+/// Squared distance from the centre of a ball's picture, in radii, up to which it is compared: up to 76 degrees.
+/// Beyond it one pixel contains many directions.
 const RIM: f64 = 0.94;
 
 /// The reflectance of appendix B (B.2.1 to B.3.5) times the cosine, per steradian.
@@ -38,7 +39,7 @@ fn appendix_b(roughness: f64, metallic: f64, normal: DVec3, light: DVec3, viewer
     let a = alpha * alpha;
     let distribution = a / (PI * ((n_h * n_h) * (a - 1.0) + 1.0).powi(2));
     let root = |cosine: f64| (a + (1.0 - a) * cosine * cosine).sqrt();
-    // Masking and shadowing at one height.
+    // Height-correlated masking and shadowing.
     let visibility = 0.5 / (n_l * root(n_v) + n_v * root(n_l));
     let specular = visibility * distribution;
     let weight = (1.0 - v_h).powi(5);
@@ -64,16 +65,16 @@ fn balls(lobe: Option<Lobe>) -> World {
             world.spawn((Mesh(Arc::clone(&ball)), material, place));
         }
     }
-    // As the importer divides candela.
+    // Divided by π, as the importer does with candela.
     world.spawn((Light::point(Vec3::splat((INTENSITY / PI) as f32)), Transform::from_translation(LAMP)));
     let projection = Projection::Orthographic { half_width: 6.0, half_height: 3.0, near: 0.1, far: 100.0 };
     world.spawn((Camera { projection, exposure: 1.0 }, Transform::from_xyz(0.0, 0.0, 20.0)));
-    // Parallel rays, and the viewer as far as they come from.
+    // Parallel rays, and an infinitely distant viewer.
     world.insert_resource(SceneSettings { local_viewer: false, ..SceneSettings::default() });
     world
 }
 
-/// Relative root mean square and largest difference from appendix B, of each ball.
+/// Returns the relative root mean square and the largest difference from appendix B for each ball.
 fn errors(pixels: &[DVec3]) -> [[(f64, f64); 6]; 3] {
     let mut found = [[(0.0, 0.0); 6]; 3];
     for (row, metallic) in METALLIC.into_iter().enumerate() {
@@ -110,7 +111,7 @@ fn frame(world: &mut World, model: ReflectionModel) -> Vec<DVec3> {
     draw(world, 6 * PIXELS as u32, 3 * PIXELS as u32, &options).0
 }
 
-/// Root mean square over the balls.
+/// Returns the root mean square over the balls.
 fn overall(errors: &[[(f64, f64); 6]; 3]) -> f64 {
     let all = errors.iter().flatten();
     (all.map(|(relative, _)| relative * relative).sum::<f64>() / 18.0).sqrt()
@@ -129,14 +130,14 @@ fn metallic_roughness_balls_look_as_the_specification_says() {
             println!("{:16} metallic {metallic:3}: {}", model.name(), row.join("  "));
         }
         println!("{:16} all: {:.3}, with bare lobes {:.3}", model.name(), overall(&kept), overall(&bare));
-        // The bare lobes are what these materials had: a plastic without a highlight, metals without light.
+        // With bare lobes these materials would be a plastic without a highlight, and metals without light.
         assert!(overall(&kept) < 0.5 * overall(&bare), "{}", model.name());
         found.push((*model, kept));
     }
     for (model, errors) in found {
         let (of_all, of_dielectrics) = match model {
-            // The specification's own reflectance. What is left: the diffuse part, which here does not lose what the surface reflects
-            // before it (4 % at normal incidence), and the facets of the balls.
+            // The specification's own reflectance. What remains are the diffuse part, which here is not reduced by
+            // what the surface reflects before it (4 % at normal incidence), and the facets of the balls.
             ReflectionModel::TorranceSparrow => (0.035, 0.05),
             // Lobes without the tail of the specification's, and without masking.
             ReflectionModel::Blinn | ReflectionModel::BlinnMatched | ReflectionModel::Blinn4n => (0.19, 0.19),
@@ -150,7 +151,7 @@ fn metallic_roughness_balls_look_as_the_specification_says() {
 
 #[test]
 fn a_smooth_plastic_shows_the_lamp() {
-    // Roughness .15: the peak is .04/(4 alpha^2) = 20 times as bright as k_s, far above the diffuse light around it.
+    // At roughness .15 the peak is .04/(4 alpha^2) = 20 times k_s, much brighter than the diffuse light around it.
     for model in ReflectionModel::ALL {
         let pixels = frame(&mut balls(None), *model);
         let ball =
@@ -185,7 +186,8 @@ fn energy_keeping_frames_agree_with_the_twin() {
             let found = lumbre_tests::compare::compare(&got, &expected);
             println!("{:16} filtered {filtered}: {found:?}", model.name());
             assert!(found.pixels > 1200, "{found:?}");
-            // Sharp lobes of the exponent 4000, 500 times as bright at their peak as bare ones, whose cosines are rounded.
+            // Sharp lobes with the exponent 4000, 500 times as bright at their peak as bare ones, of rounded
+            // cosines.
             assert!(found.relative_l2 < 2e-4, "{}: {found:?}", model.name());
         }
     }

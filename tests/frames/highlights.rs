@@ -1,5 +1,5 @@
-//! Filtered highlights under Phong shading: nearer to what a pixel holds than the bare equation, steady under motion, and off
-//! unless asked for.
+//! Filtered highlights under Phong shading: nearer to the mean over the pixel than the plain equation, steady under
+//! motion, and off unless asked for.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ const SIZE: u32 = 64;
 const FINER: u32 = 16;
 const BACKGROUND: f64 = 100.0;
 
-/// Fine rings, far away, with sharp highlights: a pixel holds a good part of a ring's curve.
+/// Fine rings, far away, with sharp highlights: a pixel contains a good part of a ring's curvature.
 fn rings(shininess: f32, sideways: f64) -> World {
     let mut world = World::new();
     let front = Surface {
@@ -50,8 +50,9 @@ fn options(model: ReflectionModel, filtered: bool) -> FrameOptions {
     FrameOptions { shading, reflection: Some(model), specular_antialiasing: Some(filtered), ..linear() }
 }
 
-/// What the pixels of a frame hold, from one that is `FINER` times finer, seen through the pixel filter that is stated: a
-/// Gaussian with a standard deviation of half a pixel, cut off at a pixel and a half. Nothing where a background is within it.
+/// Returns the reference for the pixels of a frame, from a frame with `FINER` times the resolution and the
+/// documented pixel filter: a Gaussian with a standard deviation of half a pixel, cut off at a pixel and a half.
+/// `None` where the background is within the filter.
 fn reference(world: &mut World, model: ReflectionModel) -> Vec<Option<DVec3>> {
     let fine = SIZE * FINER;
     let (pixels, _) = draw(world, fine, fine, &options(model, false));
@@ -106,7 +107,7 @@ fn filtered_highlights_are_nearer_to_what_the_pixel_holds() {
 
 #[test]
 fn filtered_highlights_do_not_flicker() {
-    // The rings creep by a tenth of a pixel a frame; the light in the frame ought to stay.
+    // The rings move by a tenth of a pixel per frame; the total light in the frame should stay the same.
     let spread = |filtered| {
         let sums: Vec<f64> = (0..10)
             .map(|step| {
@@ -142,7 +143,8 @@ fn a_plane_and_the_other_shadings_are_left_alone() {
         let (bare, filtered) = (with(false), with(true));
         let apart =
             bare.iter().zip(&filtered).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f64::max);
-        // The exponent goes through 2/alpha^2 - 2 and back: a few roundings, times n/e for a highlight of 1.
+        // The exponent is converted to alpha^2 and back as 2/alpha^2 - 2: a few roundings, times n/e for a
+        // highlight of 1.
         assert!(apart < 200.0 * 4.0 * 6e-8 * 5.0, "{}: {apart}", shading.name());
     }
 }
@@ -160,7 +162,7 @@ fn it_is_off_unless_the_scene_or_the_caller_asks() {
     assert!(frame(true, Some(false)) == off && frame(false, Some(true)) == on, "the caller decides last");
 }
 
-/// As the bounds of the ball tests: the chain is longer by the derivative of the normal, whose rounding of 2^-23 is divided by the
+/// As in the ball tests, with the additional derivative of the normal, whose rounding of 2^-23 is divided by the
 /// change within a pixel and multiplied by its effect on the lobe. Measured at most 5e-5 and 2.1e-5.
 const LARGEST: f64 = 2e-4;
 const RELATIVE_L2: f64 = 1e-4;

@@ -1,5 +1,6 @@
-//! Irradiance volumes: what has no lightmap takes the baked light around it, in every shading, once, and with nothing of walls in it; the frame is the f64 twin's, the
-//! traced picture the frame's; a ball that is carried through a baked room has the colour of its surroundings, against paths.
+//! Irradiance volumes: objects without a lightmap receive the baked light around them, in every shading, only once,
+//! and without light from inside walls. The frame agrees with the f64 twin, and the traced picture with the frame;
+//! a ball that is carried through a baked room has the colour of its surroundings, compared with path tracing.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -23,11 +24,12 @@ use crate::adapter::{Canvas, draw, linear};
 
 const SIZE: usize = 96;
 
-/// Half floats of the probes' light, 2^-11 of it, and a filter's weights, 2^-9 of the step between probes along each of three axes (Vulkan's least precision): of light up to
-/// 1.5 with steps up to 1, reflected with at most 0.9.
+/// Half floats of the probes' light, 2^-11 relative, and a filter's weights, 2^-9 of the step between probes along
+/// each of three axes (Vulkan's minimum precision): for light up to 1.5 with steps up to 1, reflected with at most
+/// 0.9.
 const BOUND: f64 = 0.9 * (1.5 / 2048.0 + 3.0 / 512.0);
 
-/// Numbers that are the same in every run.
+/// Pseudo-random numbers that are the same in every run.
 fn numbers(seed: u64) -> impl FnMut() -> f32 {
     let mut state = seed;
     move || {
@@ -36,7 +38,7 @@ fn numbers(seed: u64) -> impl FnMut() -> f32 {
     }
 }
 
-/// Light between 0.5 and 1.5, different in every cell and from every side.
+/// Light between 0.5 and 1.5, different in every cell and for every side.
 fn varied(resolution: UVec3, seed: u64) -> IrradianceVolume {
     let mut number = numbers(seed);
     let mut light = || 0.5 + Vec3::new(number(), number(), number());
@@ -55,7 +57,7 @@ fn ball(radius: f32) -> Mesh {
     Mesh(Arc::new(ball))
 }
 
-/// Two balls and a sheet, one of them with a map of its own, under lights of every kind and two ambient ones.
+/// Two balls and a sheet, one of them with its own lightmap, under lights of every kind and two ambient ones.
 fn scene() -> World {
     let mut world = World::new();
     let front = Surface {
@@ -76,7 +78,7 @@ fn scene() -> World {
     };
     let baked = (Lightmap { image: Arc::new(lightmap) }, StaticObject);
     world.spawn((ball(0.6), material, Transform::from_xyz(0.8, 0.2, 0.0), baked));
-    // Seen from behind.
+    // A sheet that is seen from behind.
     let back = Surface { diffuse: Vec3::new(0.8, 0.3, 0.1), ..front };
     let sheet = Material { back: Some(back), double_sided: true, front, ..Material::default() };
     let place = Transform::from_xyz(0.0, -0.9, 0.2).with_rotation(DQuat::from_rotation_x(-2.1));
@@ -98,7 +100,7 @@ fn scene() -> World {
     world
 }
 
-/// Puts a volume into a World, in cells that are no cubes; the balls reach beyond it.
+/// Adds a volume with cells that are not cubes to a world; the balls extend beyond it.
 fn place(world: &mut World, volume: IrradianceVolume) -> Entity {
     let box_of_probes = Transform::from_xyz(0.1, 0.0, -0.1).with_scale(DVec3::new(2.2, 1.6, -1.3));
     world.spawn((volume, box_of_probes)).id()
@@ -121,7 +123,7 @@ fn every_shading_agrees_with_the_twin_and_counts_nothing_twice() {
         let volume = place(&mut world, volume);
         let mut worst = against_the_twin(&mut world, *shading);
         assert!(worst.pixels > 400, "{worst:?}");
-        // What textures bend and weaken.
+        // With normal and occlusion textures.
         let mut bare = world.query_filtered::<Entity, (With<Mesh>, Without<Lightmap>)>();
         let bare = bare.iter(&world).next().unwrap();
         let texels = [[150, 90, 240, 255], [100, 160, 220, 255], [60, 128, 230, 255], [128, 200, 200, 255]];
@@ -132,7 +134,7 @@ fn every_shading_agrees_with_the_twin_and_counts_nothing_twice() {
             ..MaterialTextures::default()
         });
         let textured = against_the_twin(&mut world, *shading);
-        // By no other light at all.
+        // Without any other light.
         let lamps: Vec<Entity> = world.query_filtered::<Entity, With<Light>>().iter(&world).collect();
         lamps.into_iter().for_each(|lamp| {
             world.despawn(lamp);
@@ -143,7 +145,7 @@ fn every_shading_agrees_with_the_twin_and_counts_nothing_twice() {
         }
         println!("{}: {:.1e} at most of {BOUND:.1e}", shading.name(), worst.largest);
         assert!(worst.largest < BOUND, "{}: {worst:?}", shading.name());
-        // Negative control: one cell of other light is seen.
+        // Negative control: different light in one cell is detected.
         let mut changed = world.get_mut::<IrradianceVolume>(volume).unwrap();
         changed.cubes[8].0.iter_mut().for_each(|side| *side += 0.3);
         let (other, _) = draw(&mut world, 24, 24, &linear());
@@ -161,7 +163,7 @@ fn even_light_is_exact_wherever_a_ball_goes() {
     let mut world = World::new();
     world.spawn((ball(0.5), Material::matt(Vec3::splat(0.5))));
     world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 3.0)));
-    // Ambient light that the volume stands for.
+    // Ambient light that the volume replaces.
     world.insert_resource(SceneSettings { ambient: Vec3::splat(0.7), ..SceneSettings::default() });
     let volume = world.spawn((even(Vec3::new(0.5, 1.0, 0.25)), Transform::IDENTITY)).id();
     let mut canvas = Canvas::new(40, 40);
@@ -172,7 +174,7 @@ fn even_light_is_exact_wherever_a_ball_goes() {
         world
             .entity_mut(volume)
             .insert((IrradianceVolume { resolution, cubes, inside }, Transform::from_scale(scale)));
-        // Within the box, across its face, and far outside of it, as seen from the ball.
+        // With the ball within the box, on its face, and far outside.
         for x in [0.0, 0.5 * scale, -30.0 * scale] {
             world.get_mut::<Transform>(volume).unwrap().translation.x = x;
             let (pixels, report) = canvas.draw(&mut world, &linear());
@@ -184,7 +186,7 @@ fn even_light_is_exact_wherever_a_ball_goes() {
             assert!(worst < 1e-6, "{resolution} {scale} {x}: {worst}");
         }
     }
-    // What it stands for is back where the volume is gone, or switched off.
+    // The replaced ambient light is back when the volume is removed or switched off.
     let options = FrameOptions { irradiance_volumes: false, ..linear() };
     let (off, _) = canvas.draw(&mut world, &options);
     world.despawn(volume);
@@ -205,14 +207,14 @@ fn what_is_bright_behind_a_wall_does_not_shine_through_it() {
     let brightest = |inside: Vec<bool>| {
         let mut world = World::new();
         world.spawn((volume(inside), Transform::from_scale(5.0)));
-        // It touches the wall, whose face is at x = -0.5.
+        // The ball touches the wall, whose face is at x = -0.5.
         world.spawn((ball(0.5), Material::matt(Vec3::ONE), Transform::from_xyz(-1.01, 0.0, 0.0)));
         world.spawn((Camera::default(), Transform::from_xyz(-1.0, 0.0, 3.0)));
         let (pixels, _) = draw(&mut world, 60, 60, &linear());
         pixels.iter().map(|pixel| pixel.x).fold(0.0, f64::max)
     };
     let marked = brightest(vec![false, false, true, false, false]);
-    // Half a cell from it the wall's probe counts 1/1024 of the other: 5.05 of 0.1, and half floats.
+    // Half a cell away the wall's probe has 1/1024 of the weight of the other: 5.05 and 0.1, and half floats.
     let bound = (0.1 + 5.05 / 1024.0) * (1.0 + 2.0 / 1024.0);
     println!("beside a wall: {marked:.4}; without marks {:.2}", brightest(Vec::new()));
     assert!(marked < bound, "{marked} of {bound}");
@@ -229,7 +231,7 @@ fn each_object_takes_the_volume_around_it() {
             world.spawn((ball(0.4), Material::matt(Vec3::ONE), Transform::from_xyz(x, height, 0.0)));
         }
     }
-    // Within the second one, and smaller: the upper ball on the right is its own.
+    // A smaller volume within the second one, which the upper ball on the right takes.
     world.spawn((even(Vec3::Z), Transform::from_xyz(1.0, 0.6, 0.0)));
     world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 4.0)));
     let (pixels, _) = draw(&mut world, 64, 64, &linear());
@@ -262,7 +264,7 @@ fn volumes_that_cannot_be_used_are_named_and_left_out() {
         assert!(fault.contains("irradiance volume `broken`") && fault.contains(word), "{word}: {fault}");
         assert!(pixels == without, "{word}: not the frame without it");
         assert_eq!(report.census.irradiance_volumes, 0);
-        // Beside one that can be used nothing is lost.
+        // Another volume that can be used still is.
         self::place(&mut world, fine());
         let (pixels, report) = draw(&mut world, SIZE as u32, SIZE as u32, &linear());
         assert!(pixels != without && report.census.irradiance_volumes == 1 && report.left_out.len() == 1);
@@ -286,7 +288,7 @@ fn light_that_changes_or_moves_is_seen() {
         change(&mut world);
         let (pixels, report) = canvas.draw(&mut world, &linear());
         assert!(pixels == draw(&mut world, SIZE as u32, SIZE as u32, &linear()).0, "change {number}");
-        // All marks alike change weights, and no light.
+        // Marking all probes changes only weights, not the light.
         assert_eq!(pixels != former, number != 3, "change {number}: is it seen?");
         assert!(report.statistics.uploads.irradiance_volumes > 0, "change {number}");
         former = pixels;
@@ -316,7 +318,7 @@ fn the_ray_tree_reads_what_a_frame_reads() {
         let traced: Vec<_> = picture.radiance.iter().zip(&interior).map(inside).collect();
         compare(&frame.iter().copied().map(Some).collect::<Vec<_>>(), &traced)
     });
-    // The same, and one eight-bit step as frames and rays agree elsewhere.
+    // The same bound, plus one eight-bit step, as in other comparisons of frames and rays.
     assert!(differences[0].largest < BOUND + 1.0 / 255.0, "{:?}", differences[0]);
     differences.reverse();
     assert!(differences[0].largest > 0.1, "negative control: {:?}", differences[0]);
@@ -349,7 +351,8 @@ fn explain_says_where_a_volume_is_missing() {
     world.despawn(volume);
 }
 
-/// A room of 6 m by 3 m by 4 m, red on the left, green on the right, else white; a lamp under its ceiling, and a block in it.
+/// A room of 6 m by 3 m by 4 m, red on the left, green on the right, white elsewhere, with a lamp under its ceiling
+/// and a block in it.
 fn room() -> World {
     let mut world = World::new();
     let half = Vec3::new(3.0, 1.5, 2.0);
@@ -385,7 +388,7 @@ fn room() -> World {
     world
 }
 
-/// What a ball is carried through, from the red wall to the green one, before and behind the block.
+/// The path of the ball from the red wall to the green one, in front of and behind the block.
 const WAY: [[f64; 3]; 6] = [
     [-2.5, -0.6, 0.0],
     [-1.2, 0.4, 0.8],
@@ -410,7 +413,8 @@ fn a_ball_takes_the_colour_of_its_surroundings_against_paths() {
     };
     Bake::new(&options).run(&mut world).unwrap();
     let camera = world.spawn((Camera::default(), Transform::IDENTITY)).id();
-    // Of the baked room's mean, as a game without a bake would have it.
+    // For each position the error of the volume, and that of the same light from everywhere, as in a game without a
+    // bake.
     let mut errors: Vec<[f64; 2]> = Vec::new();
     let mut tints = Vec::new();
     for place in WAY.map(DVec3::from_array) {
@@ -440,7 +444,7 @@ fn a_ball_takes_the_colour_of_its_surroundings_against_paths() {
             (squares.sum::<f64>() / pixels.len() as f64).sqrt() / (truth.element_sum() / 3.0)
         };
         let (frame, _) = draw(&mut world, 32, 32, &linear());
-        // As bright on the whole as the truth, and the same from everywhere.
+        // As bright overall as the truth, and the same from all directions.
         let flat = vec![DVec3::splat(truth.element_sum() / 3.0); 32 * 32];
         errors.push([error(&frame), error(&flat)]);
         let seen = mean(&frame);
@@ -454,10 +458,12 @@ fn a_ball_takes_the_colour_of_its_surroundings_against_paths() {
     let mean = |which: usize| errors.iter().map(|errors| errors[which]).sum::<f64>() / errors.len() as f64;
     println!("on average {:.1} %, and {:.1} %", 100.0 * mean(0), 100.0 * mean(1));
     println!("red over green, seen and true: {tints:.2?}");
-    // By the red wall red, by the green one green, between them as much of either as the truth has: of two walls at half a metre six numbers make a little too much.
+    // Red near the red wall, green near the green one, and in between as much of each as in the truth; of two walls
+    // at half a metre the six directions make slightly too much.
     assert!(tints[0][0] > 1.1 && tints[5][0] < 0.95, "{tints:?}");
     assert!(tints.iter().all(|[seen, truth]| (seen - truth).abs() < 0.15), "{tints:?}");
-    // Most of it is the ambient cube: of a lamp straight above it takes a sixth on average where a ball takes a quarter, of one along a diagonal more than that.
+    // Most of the error is due to the ambient cube: of a lamp straight above it reflects a sixth on average where a
+    // ball reflects a quarter, and of one along a diagonal more than that.
     assert!(mean(0) < 0.25 && mean(0) < 0.65 * mean(1), "{errors:?}");
 }
 
@@ -479,7 +485,7 @@ fn volumes_leave_what_has_lightmaps_alone() {
     let uploads = report.statistics.uploads;
     let pictures = (uploads.lightmaps, uploads.irradiance_volumes, uploads.textures);
     assert_eq!(pictures, (4 * 8, 0, 0), "the lightmap of four texels, and nothing else");
-    // A lightmap that is switched off is no call for the volume either.
+    // An object whose lightmap is switched off does not take the volume either.
     let off = FrameOptions { lightmaps: false, ..linear() };
     let (_, report) = draw(&mut world, SIZE as u32, SIZE as u32, &off);
     assert_eq!(report.census.lit_by_volume, 0);

@@ -1,4 +1,5 @@
-//! The demo level: the light of all its lamps against the twin, and the whole picture, textures and all, against a golden.
+//! The demo level: the light of all its lamps compared with the twin, and the whole picture including textures
+//! compared with a golden image.
 
 use bevy_ecs::prelude::*;
 use glam::DVec3;
@@ -12,7 +13,7 @@ use crate::adapter::{draw, linear};
 
 const SIZE: (usize, usize) = (160, 90);
 
-/// The level with one camera left.
+/// Loads the level and keeps one camera.
 fn level(camera: &str) -> World {
     let mut world = World::new();
     let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/demo.glb"));
@@ -26,7 +27,7 @@ fn level(camera: &str) -> World {
     world
 }
 
-/// What the twin does not know is taken away: textures, and what is blended. Mirrors and glass are opaque in both.
+/// Removes what the twin does not support: textures, and blended objects. Mirrors and glass are opaque in both.
 fn plain(world: &mut World) {
     let mut seen_through = world.query::<(Entity, &Material)>();
     let gone: Vec<Entity> = seen_through
@@ -48,8 +49,8 @@ fn against_twin(world: &mut World, drawn: &mut World) -> Difference {
     let frame = twin::draw(world, SIZE.0, SIZE.1, TwinOptions::default());
     let options = FrameOptions { mirror_depth: 0, refraction: false, ..linear() };
     let (got, _) = draw(drawn, SIZE.0 as u32, SIZE.1 as u32, &options);
-    // Inside one object, away from its own edges, and without the lamps: they are far brighter than what they light, and would hide
-    // it in the norm.
+    // Compared inside one object, away from its own edges, and without the lamps, which are far brighter than what
+    // they light and would dominate the norm.
     let smooth = |at: usize, center: DVec3| {
         let rows = [at - SIZE.0, at, at + SIZE.0];
         let near = rows.into_iter().flat_map(|row| [row - 1, row, row + 1]);
@@ -73,8 +74,9 @@ fn the_level_agrees_with_the_twin() {
         let difference = against_twin(&mut world, &mut drawn);
         println!("{camera}: {difference:?}");
         assert!(difference.pixels > SIZE.0 * SIZE.1 / 4, "{camera}: {difference:?}");
-        // The ball's bound (balls.rs), for sums over 35 lights of radiance up to 2 and positions up to 40 m from the origin, whose
-        // f32 rounding (2 um) moves a highlight of n = 500 by that over its width of 1 / sqrt(500) times a metre.
+        // The ball's bound (balls.rs) for sums over 35 lights of radiance up to 2, and positions up to 40 m from
+        // the origin, whose f32 rounding (2 um) moves a highlight of n = 500 by that over its width of 1 /
+        // sqrt(500) times a metre.
         assert!(difference.largest < 1e-3, "{camera}: {difference:?}");
         assert!(difference.relative_l2 < 1e-4, "{camera}: {difference:?}");
     }
@@ -104,7 +106,8 @@ fn the_level_looks_as_it_did() {
     }
     let expected = image::open(golden).expect("a missing golden is a failure, not a pass").to_rgb8();
     assert_eq!(expected.dimensions(), (SIZE.0 as u32, SIZE.1 as u32));
-    // Software rasterizers differ between processors by up to 3 codes, and pixels on edges by more: at most 1 % of them.
+    // Software rasterizers differ between processors by up to 3 codes, and in pixels on edges by more: at most 1 %
+    // of them.
     let beyond = |bytes: &[u8]| {
         let apart = bytes.chunks(3).zip(expected.chunks(3));
         apart.filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 3)).count()

@@ -1,5 +1,5 @@
-//! The lights that a pass tests and those that contribute, as its shaders count them, against the f64 twin of the same scene: every list that lights are found by, every kind of light,
-//! every rate of shading.
+//! The lights that a pass tests and those that contribute, as counted by its shaders, compared with the f64 twin of
+//! the same scene: with every kind of light list, every kind of light, and every rate of shading.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
@@ -17,12 +17,12 @@ use crate::adapter::{Canvas, linear};
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;
 const PIXELS: u64 = (WIDTH * HEIGHT) as u64;
-/// What counts as contributing, of a radiance at exposure 1.
+/// Smallest radiance at exposure 1 that counts as a contribution.
 const LEAST: f64 = 1.0 / 255.0;
-/// By how much f32 may be off where a light is compared with that: far more than the twins' bounds.
+/// How much f32 may be off where a light is compared with that, which is far more than the twins' bounds.
 const ROUNDING: f64 = 1e-4;
 
-/// A camera before a wall that fills its frame.
+/// A camera in front of a wall that fills its frame.
 fn wall(material: Material) -> (World, Entity) {
     let mut world = World::new();
     let projection =
@@ -33,7 +33,7 @@ fn wall(material: Material) -> (World, Entity) {
     (world, wall)
 }
 
-/// An upright square that faces the camera.
+/// Adds an upright square that faces the camera.
 fn pane(world: &mut World, side: f32, z: f64, material: Material) -> Entity {
     let upright = Transform::from_xyz(0.0, 0.0, z).looking_at(DVec3::new(0.0, -1.0, z), DVec3::Z);
     let mut mesh = shapes::plane(side, side, 1, 1);
@@ -48,7 +48,8 @@ fn glossy() -> Material {
     material
 }
 
-/// Lamps that light a part of the wall each: with every kind of cone, attenuation and colour, and a directional one.
+/// Adds lamps that each light a part of the wall, with every kind of cone, attenuation and colour, and a
+/// directional one. Returns their number.
 fn lamps(world: &mut World, range: f32) -> u64 {
     let ranged = Attenuation { range, ..Attenuation::INVERSE_SQUARE };
     let own = Attenuation { range, constant: 0.5, linear: 0.4, quadratic: 0.3, clamp: false };
@@ -69,7 +70,7 @@ fn lamps(world: &mut World, range: f32) -> u64 {
         let place = Transform::from_xyz(x, y, 1.2).looking_at(DVec3::new(x * 0.8, y, 0.0), DVec3::Y);
         world.spawn((light.clone(), place));
     }
-    // Neither an ambient light nor one that is off is tested.
+    // Ambient lights and lights that are off are not tested.
     world.spawn((Light::ambient(Vec3::splat(0.2)), Transform::IDENTITY));
     world.spawn((Light { enabled: false, ..Light::point(Vec3::ONE) }, Transform::IDENTITY));
     lights.len() as u64
@@ -79,7 +80,7 @@ fn counting(lists: LightLists, shading: Shading) -> FrameOptions {
     FrameOptions { light_lists: lists, shading: Some(shading), measure: Measure::Lights, ..linear() }
 }
 
-/// What the passes of a frame count: opaque surfaces with a lightmap, without one, blended ones.
+/// Returns the counts of the passes of a frame: opaque surfaces with a lightmap, without one, and blended ones.
 fn counted(world: &mut World, options: &FrameOptions) -> [LightCount; 3] {
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
     let (picture, _) = canvas.draw(world, options);
@@ -90,7 +91,7 @@ fn counted(world: &mut World, options: &FrameOptions) -> [LightCount; 3] {
         pass.and_then(|pass| pass.lights).unwrap_or_default()
     };
     let counts = ["lightmap", "forward", "transparent"].map(of);
-    // It is the picture of a frame that counts nothing, and that one has no trace of it.
+    // The picture is that of a frame that does not count, and that frame contains no trace of counting.
     let plain = FrameOptions { measure: Measure::TimeAndInvocations, ..options.clone() };
     assert!(canvas.draw(world, &plain).0 == picture, "counting changes the picture");
     assert!(
@@ -103,13 +104,14 @@ fn counted(world: &mut World, options: &FrameOptions) -> [LightCount; 3] {
     counts
 }
 
-/// How many contribute at least, and at most, whatever f32 rounds.
+/// Returns the smallest and largest number of contributions, given the rounding of f32.
 fn contributing<'a>(reflected: impl IntoIterator<Item = &'a f64> + Clone) -> [u64; 2] {
     [1.0 + ROUNDING, 1.0 - ROUNDING]
         .map(|factor| reflected.clone().into_iter().filter(|light| **light > LEAST * factor).count() as u64)
 }
 
-/// Fails unless a count is what the twin has, and that is telling: many contribute and many do not, and rounding leaves few open.
+/// Fails unless a count is that of the twin and the test is meaningful: many contribute and many do not, and
+/// rounding leaves few undecided.
 fn check(name: &str, count: LightCount, tested: u64, reflected: &[Vec<f64>]) {
     let [least, most] = contributing(reflected.iter().flatten());
     assert_eq!(count.tested, tested, "{name}");
@@ -144,7 +146,7 @@ fn every_light_of_brute_force_and_of_objects_lists() {
 fn lists_of_objects_count_what_is_in_them() {
     let (mut world, _) = wall(glossy());
     let lights = lamps(&mut world, 3.0);
-    // Too far to reach the wall: in no list of its.
+    // Too far away to reach the wall, and therefore not in its list.
     for x in [-9.0, 0.0, 9.0] {
         world.spawn((Light::point(Vec3::ONE).with_range(2.0), Transform::from_xyz(x, 0.0, 3.0)));
     }
@@ -156,7 +158,8 @@ fn lists_of_objects_count_what_is_in_them() {
 
 #[test]
 fn clusters_count_the_entries_of_their_lists() {
-    // Ranges that reach all of the wall: each list has every light, an odd number of lean ones among them.
+    // With ranges that reach all of the wall, each list has every light, and an odd number of inverse-square
+    // lights.
     for range in [60.0, 1.4] {
         let (mut world, _) = wall(glossy());
         let lights = lamps(&mut world, range);
@@ -168,7 +171,7 @@ fn clusters_count_the_entries_of_their_lists() {
         if range > 10.0 {
             check("clusters that have all", forward, PIXELS * lights, &reflected);
         } else {
-            // What contributes has to be in a list; what is in no list is not tested.
+            // Every contributing light has to be in a list; lights in no list are not tested.
             let [least, most] = contributing(reflected.iter().flatten());
             println!(
                 "short ranges: {forward:?}, the twin has {least} to {most} of at most {}",
@@ -178,7 +181,7 @@ fn clusters_count_the_entries_of_their_lists() {
             assert!(forward.tested >= least && forward.tested < PIXELS * lights, "{forward:?}");
         }
     }
-    // Nothing is in a list: what the loops read there is no light of theirs.
+    // Empty lists: what the loops read there is not one of their lights.
     let (mut world, _) = wall(glossy());
     for x in 0..4 {
         let behind = Transform::from_xyz(f64::from(x), 0.0, 9.0);
@@ -192,7 +195,7 @@ fn clusters_count_the_entries_of_their_lists() {
 
 #[test]
 fn vertices_count_for_flat_and_gouraud_shading() {
-    // No two triangles share a vertex: each corner is evaluated once.
+    // No two triangles share a vertex, so each corner is evaluated once.
     let sphere = shapes::uv_sphere(1.5, 24, 12);
     let corners: Vec<usize> = sphere.indices.iter().map(|index| *index as usize).collect();
     let soup = TriangleMesh {
@@ -219,15 +222,15 @@ fn what_is_hidden_when_it_is_drawn_is_not_tested_and_passes_are_told_apart() {
     let (mut world, wall) = wall(glossy());
     let lights = lamps(&mut world, 30.0);
     let options = counting(LightLists::Everything, Shading::Phong);
-    // A pane that covers all of the wall, drawn before it.
+    // A pane that covers the whole wall and is drawn before it.
     let front = pane(&mut world, 20.0, 1.0, glossy());
     assert_eq!(counted(&mut world, &options)[1].tested, PIXELS * lights);
-    // Blended, both are seen.
+    // When it is blended, both are visible.
     let glass = Material { alpha: 0.5, alpha_mode: AlphaMode::Blend, ..glossy() };
     world.entity_mut(front).insert(glass);
     let [_, forward, blended] = counted(&mut world, &options);
     assert_eq!([forward.tested, blended.tested], [PIXELS * lights; 2]);
-    // With a lightmap the wall has a pass of its own.
+    // With a lightmap the wall is in a separate pass.
     let image = LightmapImage {
         name: "map".to_owned(),
         width: 2,
@@ -259,7 +262,7 @@ fn of_baked_lights_the_highlight_contributes() {
             reflected_by_pixel(&mut world, WIDTH as usize, HEIGHT as usize, TwinOptions::default());
         let [lightmapped, ..] = counted(&mut world, &counting(lists, Shading::Phong));
         check(&format!("baked, {lists:?}"), lightmapped, PIXELS * 7, &reflected);
-        // Were they not baked, more would contribute.
+        // If they were not baked, more would contribute.
         lights.iter_mut(&mut world).for_each(|mut light| light.bake = BakeMode::Dynamic);
         let [dynamic, ..] = counted(&mut world, &counting(lists, Shading::Phong));
         assert!(dynamic.contributing > lightmapped.contributing + PIXELS / 10, "{dynamic:?}");
@@ -274,7 +277,7 @@ fn polygon_lights_are_one_light_each() {
     world.spawn((panel, Material::emissive(Vec3::splat(0.4)), EmissiveLight, lamp));
     let reflected = reflected_by_pixel(&mut world, WIDTH as usize, HEIGHT as usize, TwinOptions::default());
     let [_, forward, _] = counted(&mut world, &counting(LightLists::Objects, Shading::Phong));
-    // The lamp itself may be in view, and is not lit by its own light.
+    // The lamp itself may be visible, and is not lit by its own light.
     let seen = reflected.iter().map(Vec::len).sum::<usize>() as u64;
     check("polygon", forward, seen, &reflected);
 }
@@ -287,17 +290,17 @@ fn light_in_shadow_is_tested_and_does_not_contribute() {
     let options = counting(LightLists::Auto, Shading::Phong);
     let lit = counted(&mut world, &options)[1];
     assert_eq!(lit, LightCount { tested: PIXELS, contributing: PIXELS });
-    // Behind the camera, over all of the wall.
+    // A pane behind the camera that covers the whole wall.
     let screen = pane(&mut world, 30.0, 7.0, Material::matt(Vec3::ONE));
     let dark = counted(&mut world, &options)[1];
     assert_eq!(dark, LightCount { tested: PIXELS, contributing: 0 });
     world.despawn(screen);
-    // So does one that is too weak, by as little as it takes: the wall reflects .6 of it.
+    // The same for a light that is only just too weak; the wall reflects .6 of it.
     for (strength, contributing) in [(1.001, PIXELS), (0.999, 0)] {
         let color = Vec3::splat((LEAST / 0.6 * strength) as f32);
         world.entity_mut(lamp).insert(Light { shadow: false, ..Light::directional(color) });
         assert_eq!(counted(&mut world, &options)[1], LightCount { tested: PIXELS, contributing });
-        // By the exposure.
+        // The exposure matters too.
         let twice = FrameOptions { exposure: Some(2.0), ..options.clone() };
         assert_eq!(counted(&mut world, &twice)[1].contributing, PIXELS);
     }

@@ -1,5 +1,5 @@
-//! Frames whose lights are found by clusters, or by lists of objects, against brute force over all lights: the same to rounding, whatever
-//! the lights, the view and the frame's size.
+//! Frames whose lights are found by clusters or by lists per object, compared with brute force over all lights: the
+//! same up to rounding, for any lights, view and frame size.
 
 use std::sync::Arc;
 
@@ -14,8 +14,9 @@ use lumbre_scene::{Camera, Mesh, Projection, SceneSettings, Transform};
 
 use crate::adapter::{draw, linear};
 
-/// The largest difference of a pixel that is let pass, relative to its brightest channel and a hundredth: other orders of the same sums,
-/// and the inverse square taken from 1/range² and the squared distance instead of from their roots. A display's step is 4e-3.
+/// The largest accepted difference of a pixel, relative to its brightest channel plus a hundredth: the sums are in
+/// another order, and the inverse square is computed from 1/range² and the squared distance instead of their roots.
+/// A step of a display is 4e-3.
 const ROUNDING: f64 = 2e-5;
 
 struct Random(u64);
@@ -35,7 +36,7 @@ impl Random {
     }
 }
 
-/// A floor and balls between which lights are put, and a camera.
+/// A floor and balls between which lights are placed, and a camera.
 fn room(random: &mut Random, projection: Projection, eye: DVec3) -> World {
     let mut world = World::new();
     let material = |random: &mut Random| {
@@ -60,8 +61,8 @@ fn room(random: &mut Random, projection: Projection, eye: DVec3) -> World {
     world
 }
 
-/// A light of any kind: points and spots of every form, with ranges from a centimetre to a kilometre and without one, black, static, in
-/// front of the camera, around it and behind it.
+/// Adds a light of any kind: point lights and spotlights of every form, with ranges from a centimetre to a
+/// kilometre and without one, black, static, in front of the camera, around it and behind it.
 fn any_light(random: &mut Random, world: &mut World) {
     let color = random.color() * 0.5;
     let range = match random.within(0.0, 12.0) as u32 {
@@ -95,19 +96,19 @@ fn any_light(random: &mut Random, world: &mut World) {
 }
 
 fn by(lists: LightLists) -> FrameOptions {
-    // Which rounds as brute force does; rendering_paths.rs has the other.
+    // Forward shading rounds as brute force does; rendering_paths.rs tests the other path.
     let rendering_path = RenderingPath::Forward;
     FrameOptions { light_lists: lists, rendering_path, shading: Some(Shading::Phong), ..linear() }
 }
 
-/// The largest difference of two frames, each pixel's relative to its brightest channel and a hundredth.
+/// Returns the largest difference of two frames, for each pixel relative to its brightest channel plus a hundredth.
 fn apart(expected: &[DVec3], got: &[DVec3]) -> f64 {
     assert!(expected.iter().any(|pixel| pixel.max_element() > 0.01), "the frame is black");
     let of = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().max_element() / (a.max_element() + 0.01);
     expected.iter().zip(got).map(of).fold(0.0, f64::max)
 }
 
-/// The difference from brute force, and what the frame with lists reports.
+/// Returns the difference from brute force, and the report of the frame with lists.
 fn difference(world: &mut World, size: (u32, u32), lists: LightLists) -> (f64, FrameReport) {
     let (expected, _) = draw(world, size.0, size.1, &by(LightLists::Everything));
     let (got, report) = draw(world, size.0, size.1, &by(lists));
@@ -120,7 +121,7 @@ fn perspective(degrees: f64, near: f64) -> Projection {
 
 #[test]
 fn clusters_and_objects_agree_with_brute_force() {
-    // Odd sizes, one tile, one column, one row; cameras that look from within the lights, from afar, and in parallel, mirrored too.
+    // Odd sizes, one tile, one column, one row; cameras among the lights, far away, and orthographic, mirrored too.
     let upright =
         |half_width: f64| Projection::Orthographic { half_width, half_height: 5.0, near: 0.5, far: 40.0 };
     let views = [
@@ -148,8 +149,8 @@ fn clusters_and_objects_agree_with_brute_force() {
 
 #[test]
 fn a_light_that_no_list_has_is_seen() {
-    // Negative control: the same scene without one of its lights differs by far more than rounding, wherever the light reaches what is in
-    // view, which most of them do not.
+    // Negative control: without one of its lights the same scene differs by far more than rounding, if the light
+    // reaches anything visible, which most of them do not.
     let scene = || {
         let mut random = Random(3);
         let mut world = room(&mut random, perspective(50.0, 0.1), DVec3::new(0.0, 4.0, 13.0));
@@ -173,8 +174,8 @@ fn a_light_that_no_list_has_is_seen() {
 
 #[test]
 fn lights_on_the_borders_of_tiles_and_slices() {
-    // A light's edge exactly on the plane between two tiles, and the camera's plane through lights: ranges that reach a border and no
-    // farther, at every border of a frame of three by two tiles.
+    // Ranges that end exactly on the planes between tiles, and lights in the camera's plane: at every border of a
+    // frame of three by two tiles.
     let mut random = Random(9);
     let mut world = room(&mut random, perspective(60.0, 0.1), DVec3::new(0.0, 0.0, 8.0));
     let half_height = 30.0_f64.to_radians().tan();
@@ -201,8 +202,8 @@ fn lights_on_the_borders_of_tiles_and_slices() {
 
 #[test]
 fn a_hundred_thousand_lights() {
-    // More than 16 bits number, of which each pixel has a few: against the sum over objects' lists, which another test holds to brute
-    // force, as brute force itself would take an hour.
+    // More lights than 16 bits can number, of which each pixel has a few. The reference is the sum over objects'
+    // lists, which another test compares with brute force, as brute force would take an hour here.
     let mut random = Random(11);
     let mut world = room(&mut random, perspective(60.0, 0.1), DVec3::new(0.0, 3.0, 9.0));
     for _ in 0..100_000 {
@@ -265,7 +266,7 @@ fn explain_says_how_lights_are_found_and_why() {
     assert!(lines[1].starts_with("objects: 1 lights without a range"), "{lines:?}");
     let gouraud = FrameOptions { shading: Some(Shading::Gouraud), ..phong.clone() };
     assert_eq!(told(&mut world, &gouraud), ["objects: 12 lights: no object is under Phong shading"]);
-    // As it says, so it is drawn.
+    // The frame is drawn as explained.
     let (_, report) = draw(&mut world, 40, 30, &phong);
     let listing = report.statistics.light_lists;
     assert_eq!((listing.clustered, listing.inverse_square_lights, listing.unbounded_lights), (true, 11, 1));
@@ -281,7 +282,7 @@ fn lamps_with_a_range_that_reach_nothing_in_view_lend_no_light_of_others() {
         far: None,
     };
     let mut world = room(&mut Random(5), projection, DVec3::new(0.0, 4.0, 9.0));
-    // The first light of all has no range; those with one are behind the camera.
+    // The first light has no range; those with one are behind the camera.
     world.spawn((
         Light::directional(Vec3::ONE),
         Transform::from_xyz(0.0, 5.0, 1.0).looking_at(DVec3::ZERO, DVec3::Y),
@@ -324,7 +325,7 @@ fn each_pass_counts_its_own_lights() {
         Camera { projection: Projection::orthographic(20.0, 20.0, 80.0), exposure: 1.0 },
         Transform::from_xyz(0.0, 0.0, 40.0),
     ));
-    // By brute force: the lamps that reach the box around a ball.
+    // By brute force: the lamps that reach the bounding box of a ball.
     let half_size = ball.positions.iter().fold(Vec3::ZERO, |half, at| half.max(at.abs())).as_dvec3();
     let reaching = |place: &DVec3| -> Vec<usize> {
         let reaches = |(lamp, range): &(DVec3, f64)| {

@@ -1,4 +1,5 @@
-//! Headless frame tests: frames of the GPU against the f64 twin. docs/testing.md says what each file proves.
+//! Headless frame tests: compares frames of the GPU with the f64 twin. docs/testing.md describes what each file
+//! proves.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 

@@ -1,4 +1,4 @@
-//! Materials without light, and materials that share a shader: each shows its own numbers.
+//! Unlit materials, and materials that share a shader: each shows its own values.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::adapter::{draw, linear};
 
 /// f32 roundings of a sum of numbers below 1.
 const EXACT: f64 = 2e-7;
-/// Of a decoded sRGB texel: half an eight-bit code where the curve is steepest (textures.rs has the reason).
+/// Error of a decoded sRGB texel: half an eight-bit code where the curve is steepest (explained in textures.rs).
 const DECODED: f64 = 4.5e-3;
 
 #[test]
@@ -26,13 +26,13 @@ fn an_unlit_material_shows_its_colour_whatever_the_light() {
     };
     let mut world = pane_of(Material { front, unlit: true, ..Material::default() });
     world.spawn((Light::directional(Vec3::splat(3.0)), Transform::IDENTITY));
-    // Neither light nor emission: KHR_materials_unlit.
+    // KHR_materials_unlit: neither light nor emission.
     let expected = DVec3::new(0.2, 0.4, 0.6);
     for shading in Shading::ALL {
         let (pixels, _) = draw(&mut world, 8, 8, &FrameOptions { shading: Some(*shading), ..linear() });
         assert!(pixels.iter().all(|pixel| (*pixel - expected).abs().max_element() < EXACT), "{}", pixels[0]);
     }
-    // Negative control: lit, it is something else.
+    // Negative control: when lit, the colour is different.
     world.query::<&mut Material>().single_mut(&mut world).unwrap().unlit = false;
     let (pixels, _) = draw(&mut world, 8, 8, &linear());
     assert!(pixels.iter().all(|pixel| (*pixel - expected).abs().max_element() > 0.1));
@@ -40,7 +40,8 @@ fn an_unlit_material_shows_its_colour_whatever_the_light() {
 
 #[test]
 fn unlit_materials_with_different_textures_stand_side_by_side() {
-    // An unlit shader reads no metallic-roughness texture, yet files give one for viewers that know no unlit materials.
+    // An unlit shader reads no metallic-roughness texture, but files may have one for viewers that do not support
+    // unlit materials.
     let white = image(1, &[[255; 4]]);
     let grey = image(1, &[[188, 188, 188, 255]]);
     let mapped = MetallicRoughnessTexture {

@@ -1,5 +1,6 @@
-//! Flat mirrors in the frame against the ray tree of the tracer: what each pixel of a mirror shows, mirrors in mirrors, panes that reflect by Fresnel's equations, fog, cameras
-//! of both kinds; and that a frame without a mirror in sight has none of it.
+//! Compares flat mirrors in the frame with the tracer's ray tree: what each pixel of a mirror shows, mirrors in
+//! mirrors, panes that reflect by Fresnel's equations, fog, and both kinds of cameras. A frame without a visible
+//! mirror must contain nothing of this.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -17,7 +18,7 @@ use crate::adapter::{draw, linear, shown};
 const WIDTH: u32 = 192;
 const HEIGHT: u32 = 144;
 
-/// A step of eight bits.
+/// One step of eight bits.
 const STEP: f64 = 1.0 / 255.0;
 
 fn matte(diffuse: Vec3) -> Material {
@@ -25,7 +26,7 @@ fn matte(diffuse: Vec3) -> Material {
     Material { front, ..Material::default() }
 }
 
-/// A mirror over a dark surface with a highlight.
+/// A mirror on a dark surface with a highlight.
 fn mirror(k_r: f32) -> Material {
     let specular = Vec3::splat(0.2);
     let front =
@@ -33,7 +34,8 @@ fn mirror(k_r: f32) -> Material {
     Material { front, mirror: Vec3::new(k_r, 0.95 * k_r, 0.9 * k_r), ..Material::default() }
 }
 
-/// A floor, balls and a tilted slab under two lamps, seen from the front; behind them stands what `back` makes of a wall.
+/// A floor, balls and a tilted slab under two lamps, seen from the front; behind them is a wall with the material
+/// `back`.
 fn room(back: Material) -> World {
     let mut world = World::new();
     let mut spawn = |mesh, material: Material, place: Transform| {
@@ -66,24 +68,25 @@ fn room(back: Material) -> World {
     world
 }
 
-/// What a frame of mirrors was compared with.
+/// The comparison of a frame with mirrors.
 #[derive(Debug)]
 struct Against {
-    /// The largest difference from the ray tree, of any channel, in pixels that show one surface.
+    /// The largest difference from the ray tree in any channel, over pixels that show one surface.
     largest: f64,
-    /// How many such pixels there are, and in how many of them a mirror shows something.
+    /// The number of such pixels, and in how many of them a mirror shows something.
     pixels: usize,
     mirrored: usize,
-    /// And in how many the difference can be seen.
+    /// In how many of them the difference is visible.
     apart: usize,
 }
 
-/// Compares a frame with the ray tree, mirrored as often, in those pixels over which the ray tree has no edge.
+/// Compares a frame with the ray tree with the same number of reflections, in those pixels over which the ray tree
+/// has no edge.
 fn against_the_ray_tree(world: &mut World, options: &FrameOptions) -> Against {
     let (frame, _) = draw(world, WIDTH, HEIGHT, options);
     let (without, _) =
         draw(world, WIDTH, HEIGHT, &FrameOptions { mirror_depth: 0, refraction: false, ..options.clone() });
-    // Of three by three rays the one in the middle goes through the pixel's.
+    // Of three by three rays per pixel, the middle one is that of the pixel's centre.
     let traced = TraceOptions {
         size: (3 * WIDTH, 3 * HEIGHT),
         depth: Some(options.mirror_depth),
@@ -94,7 +97,8 @@ fn against_the_ray_tree(world: &mut World, options: &FrameOptions) -> Against {
     let mut against = Against { largest: 0.0, pixels: 0, mirrored: 0, apart: 0 };
     for (index, (pixel, without)) in frame.iter().zip(&without).enumerate() {
         let (row, column) = (index / WIDTH as usize, index % WIDTH as usize);
-        // With the nearest rays of the pixels around it, as samples of a pixel lie farther out than its rays.
+        // The nearest rays of the surrounding pixels are included, as samples of a pixel are farther from its
+        // centre than its rays.
         let ray = |y: usize, x: usize| {
             let (y, x) = ((3 * row + y).saturating_sub(1), (3 * column + x).saturating_sub(1));
             traced[y.min(3 * HEIGHT as usize - 1) * 3 * WIDTH as usize + x.min(3 * WIDTH as usize - 1)]
@@ -112,7 +116,7 @@ fn against_the_ray_tree(world: &mut World, options: &FrameOptions) -> Against {
     against
 }
 
-/// Checks that a frame of mirrors is the ray tree's.
+/// Checks that a frame with mirrors agrees with the ray tree.
 #[allow(clippy::print_stdout, reason = "the figures of the documentation")]
 fn is_the_ray_trees(what: &str, world: &mut World, options: &FrameOptions) {
     let against = against_the_ray_tree(world, options);
@@ -125,7 +129,7 @@ fn unshadowed(mirror_depth: u32) -> FrameOptions {
     FrameOptions { mirror_depth, shadows: false, shading: Some(Shading::Phong), ..linear() }
 }
 
-/// A second mirror behind the camera, which faces the first.
+/// Adds a second mirror behind the camera, facing the first.
 fn add_mirror(world: &mut World, material: Material) {
     let place = Transform::from_xyz(0.5, 1.3, 5.0)
         .with_rotation(DQuat::from_rotation_y(0.2) * DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2));
@@ -141,7 +145,7 @@ fn a_mirror_shows_what_the_ray_tree_shows() {
     is_the_ray_trees("clusters of lights", &mut room(mirror(0.8)), &clustered);
 }
 
-/// A blended pane in a mirror is blended over what the mirror shows, as it is in the frame.
+/// A blended pane in a mirror is blended over what the mirror shows, as in the frame itself.
 #[test]
 fn what_is_blended_is_blended_in_mirrors() {
     let pane = |alpha| {
@@ -166,7 +170,7 @@ fn what_is_blended_is_blended_in_mirrors() {
     }
 }
 
-/// The ray tree's shadows are exact, so that pixels at the edges of shadows differ; there may be few of them.
+/// The ray tree's shadows are exact, so pixels at the edges of shadows differ; only a few may.
 #[test]
 fn shadows_are_in_mirrors_too() {
     for light in [
@@ -246,7 +250,8 @@ fn the_back_of_a_mirror_is_the_ray_trees() {
 #[test]
 fn a_parallel_camera_is_the_ray_trees() {
     let mut world = room(mirror(0.8));
-    // A frame's highlights are those of an eye at the camera, as OpenGL's are, or of one infinitely far away; the ray tree's are along the rays.
+    // A frame's highlights are those of an eye at the camera, as in OpenGL, or of one infinitely far away; the ray
+    // tree's are along the rays.
     world.resource_mut::<SceneSettings>().local_viewer = false;
     for mut camera in world.query::<&mut Camera>().iter_mut(&mut world) {
         camera.projection =
@@ -263,7 +268,7 @@ fn a_mirror_in_fog_is_the_ray_trees() {
     is_the_ray_trees("fog", &mut world, &unshadowed(1));
 }
 
-/// What passes adds nothing: black is behind the sheet, and the solid absorbs it.
+/// Transmitted light adds nothing here: behind the sheet it is black, and the solid absorbs it.
 #[test]
 fn a_pane_reflects_by_fresnels_equations_as_in_the_ray_tree() {
     for thin in [true, false] {
@@ -277,7 +282,7 @@ fn a_pane_reflects_by_fresnels_equations_as_in_the_ray_tree() {
             if material.transmission != Vec3::ZERO {
                 found.push(entity);
             } else if transform.translation == DVec3::ZERO {
-                // The floor ends before the pane.
+                // Moved so that the floor ends in front of the pane.
                 transform.translation.z = 4.4;
             }
         }
@@ -341,8 +346,8 @@ fn a_hall_of_mirrors_has_no_more_views_than_a_frame_may_have_and_says_so() {
     assert!(said, "{:?}", report.left_out);
 }
 
-/// From anywhere, also from within a mirror's plane, from inside of glass and from very near, in half floats and with several samples: the probe finds no value that is not
-/// finite.
+/// From any viewpoint, including in a mirror's plane, inside glass and very near, with half floats and
+/// multisampling: the probe finds only finite values.
 #[test]
 fn no_view_of_mirrors_and_glass_breaks_a_frame() {
     let mut world = room(Material { double_sided: true, ..mirror(0.9) });
@@ -359,10 +364,10 @@ fn no_view_of_mirrors_and_glass_breaks_a_frame() {
         let t = f64::from(step);
         let [x, y, z] = [1.7, 2.3, 3.1].map(|speed| (t * speed).sin());
         let eye = match step % 4 {
-            // In the plane of a mirror, and a hair before it.
+            // In the plane of a mirror, and just in front of it.
             0 => DVec3::new(0.5 + 2.0 * x, 1.3, 5.0),
             1 => DVec3::new(0.5 + x, 1.3 + y, 5.0 - 1e-6),
-            // Inside of the ball of glass.
+            // Inside the glass ball.
             2 => DVec3::new(0.1 + 0.3 * x, 0.6 + 0.2 * y, 1.0 + 0.2 * z),
             _ => DVec3::new(4.0 * x, 1.5 + 1.4 * y, 4.0 * z),
         };

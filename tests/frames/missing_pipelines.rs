@@ -1,5 +1,5 @@
-//! Frames that do not wait for their pipelines: they go on as the one before, to the bit, and come to what a renderer shows that waits. What they take is printed by the
-//! example `switch_on` of lumbre_render.
+//! Frames that do not wait for their pipelines: they continue to show bit for bit what the previous one did, and
+//! end up with what a waiting renderer shows. The example `switch_on` of lumbre_render prints how long they take.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -25,7 +25,7 @@ struct Scene {
     options: FrameOptions,
 }
 
-/// A ball over a floor under a lamp, with a spot light that is off, drawn once without waiting afterwards.
+/// A ball over a floor under a lamp, with a spotlight that is off, drawn once, with later frames not waiting.
 fn scene() -> Scene {
     let mut world = World::new();
     let floor = Mesh(Arc::new(shapes::plane(8.0, 8.0, 4, 4)));
@@ -54,7 +54,7 @@ impl Scene {
         (self.target.read_rgba8(gpu()).unwrap(), report)
     }
 
-    /// What a renderer shows that waits.
+    /// Returns what a renderer that waits draws.
     fn fresh(&mut self) -> Vec<u8> {
         let options = FrameOptions { missing_pipelines: MissingPipelines::Wait, ..self.options.clone() };
         let mut renderer = Renderer::new(gpu());
@@ -63,7 +63,7 @@ impl Scene {
         self.target.read_rgba8(gpu()).unwrap()
     }
 
-    /// Draws until nothing is awaited; the first frame, and the last.
+    /// Draws until no pipeline is awaited; returns the first and the last frame.
     fn until_there(&mut self) -> [(Vec<u8>, FrameReport); 2] {
         let first = self.frame();
         let begun = Instant::now();
@@ -77,7 +77,8 @@ impl Scene {
         }
     }
 
-    /// Makes a change whose pipelines are not there: the first frame is `as_before`, the last what it should be.
+    /// Makes a change whose pipelines do not exist yet. The first frame equals the previous one if `as_before`, and
+    /// the last one is what it should be.
     fn change(&mut self, name: &str, as_before: bool, change: impl FnOnce(&mut Self)) {
         let (before, _) = self.frame();
         change(self);
@@ -89,7 +90,7 @@ impl Scene {
         let fresh = self.fresh();
         assert!(last == fresh, "{name}: it has not come to what it should be");
         assert!(before != fresh, "{name}: negative control: the change is seen");
-        // And it stays so, without anything to wait for.
+        // It stays that way, without anything to wait for.
         let (again, report) = self.frame();
         assert!(again == fresh && report.statistics.pipelines_awaited == 0, "{name}");
     }
@@ -130,20 +131,20 @@ fn what_is_switched_on_for_the_first_time_is_shown_when_its_pipelines_are_there(
         scene.world.get_mut::<Material>(scene.ball).unwrap().transmission = Vec3::splat(0.4);
     });
     scene.change("flat shading", true, |scene| scene.options.shading = Some(Shading::Flat));
-    // Several samples are drawn into another format, and shown by a pass of their own.
+    // Multisampling uses another format and a separate display pass.
     scene.change("multisampling", true, |scene| scene.options.multisample = Some(true));
 }
 
 #[test]
 fn a_surface_that_waits_is_shown_as_far_as_it_can_be() {
     let mut scene = scene();
-    // Something to be blended, which the frame has no pass for, is not there yet; the rest is.
+    // A blended object, for which the frame has no pass yet, is missing at first; the rest is there.
     scene.change("a pane of glass", true, |scene| {
         let glass = Material { alpha: 0.5, alpha_mode: AlphaMode::Blend, ..Material::matt(Vec3::X) };
         let pane = Mesh(Arc::new(shapes::plane(3.0, 3.0, 1, 1)));
         scene.world.spawn((pane, glass, Transform::from_xyz(0.0, 1.5, 1.0)));
     });
-    // A box without a highlight is drawn by the shader of those that have one: it has one of zero.
+    // A box without a highlight is drawn by the shader of objects with one, with a highlight of zero.
     let mut fresh = Vec::new();
     let [(first, report), (last, _)] = {
         let cube = Mesh(Arc::new(shapes::cuboid(Vec3::splat(0.6), 1)));
@@ -169,7 +170,7 @@ fn lamps_that_go_out_are_out_at_once() {
         .collect();
     scene.world.spawn((Light::directional(Vec3::splat(0.5)), Transform::IDENTITY));
     scene.until_there();
-    // Clusters' lists of a class of which no light is left.
+    // The clusters' lists of a class of lights of which none is left.
     for lamp in &lamps {
         scene.world.get_mut::<Light>(*lamp).unwrap().enabled = false;
     }
@@ -181,7 +182,7 @@ fn lamps_that_go_out_are_out_at_once() {
     assert!(farthest <= 1, "{farthest} of 255 apart");
 }
 
-/// Two cells of light.
+/// A volume of two cells.
 fn volume() -> IrradianceVolume {
     let cubes =
         [Vec3::new(0.6, 0.2, 0.1), Vec3::new(0.1, 0.2, 0.6)].map(|light| AmbientCube([light; 6])).to_vec();
@@ -193,7 +194,7 @@ fn a_volume_that_is_gone_gives_no_light_even_if_the_frame_has_to_wait_for_that()
     let mut scene = scene();
     let volume = scene.world.spawn((volume(), Transform::from_scale(6.0))).id();
     let [_, (lit, _)] = scene.until_there();
-    // And something else that no frame had before.
+    // Together with another change that no earlier frame had.
     scene.options.shading = Some(Shading::Gouraud);
     scene.world.despawn(volume);
     let (first, report) = scene.frame();

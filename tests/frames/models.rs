@@ -1,4 +1,5 @@
-//! Real models, where they lie beside the checkout: they load, shade in every technique, and nothing in the frame is NaN.
+//! Real models, if they are beside the checkout: they load, are shaded with every technique, and nothing in the
+//! frame is NaN.
 
 use bevy_ecs::world::World;
 use lumbre_optics::{ReflectionModel, Shading};
@@ -44,11 +45,11 @@ fn many_lights_draw_and_stay_finite() {
     }
 }
 
-/// Two eight-bit codes of a picture, or of one exposed so that a brighter pixel is just white. Measured at most a hundredth of it:
-/// next to a light, where a radiance of a thousand falls off within a pixel.
+/// Two eight-bit codes of a picture, or of one exposed so that a brighter pixel is just white. Measured at most a
+/// hundredth of it, next to a light, where a radiance of a thousand falls off within a pixel.
 const CODES: f64 = 2.0 / 255.0;
-/// Triangles of a scan are smaller than pixels: which of two a centre falls into is a matter of f32's rounding, and with flat shading
-/// they differ. Measured at most 7 of 4,000 pixels.
+/// A scan's triangles are smaller than pixels. Which of two contains a pixel centre depends on f32's rounding, and
+/// with flat shading they differ. Measured at most 7 of 4,000 pixels.
 const SHARE: f64 = 0.005;
 
 #[test]

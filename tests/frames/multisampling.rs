@@ -1,4 +1,4 @@
-//! Four samples per pixel: edges become averages, everything else stays as it is.
+//! Four samples per pixel: edges become averages, and everything else stays the same.
 
 use bevy_ecs::prelude::*;
 use glam::{DQuat, Vec3};
@@ -23,13 +23,14 @@ fn inside_a_surface_nothing_changes() {
         let (four, _) =
             draw(&mut world, SIZE as u32, SIZE as u32, &FrameOptions { multisample: Some(true), ..options });
         let twin_options = TwinOptions { shading: Some(*shading), ..TwinOptions::default() };
-        // One triangle: where two share a pixel it is shaded for each.
+        // Inside one triangle: a pixel with two triangles is shaded for each.
         let inside = twin::draw(&mut world, SIZE, SIZE, twin_options).inside_surfaces(true);
         let inside: Vec<usize> = (0..SIZE * SIZE).filter(|&at| inside[at].is_some()).collect();
         assert!(inside.len() > 60, "{} pixels are too few", inside.len());
         for at in inside {
-            // Four equal samples are added and divided by four, two roundings, and the attributes come from plane equations that the
-            // rasterizer sets up about another point: 2^-24 of values below 2 m, times the exponent of 20 and a few.
+            // Four equal samples are added and divided by four, two roundings. The attributes come from plane
+            // equations that the rasterizer sets up around another point: 2^-24 of values below 2 m, times the
+            // exponent of 20 and a few.
             let apart = (single[at] - four[at]).abs().max_element();
             assert!(apart <= 5e-6, "{}: pixel {at}: {apart}", shading.name());
         }
@@ -40,7 +41,7 @@ fn inside_a_surface_nothing_changes() {
 fn edges_are_averages_of_four_samples() {
     let mut world = pane_of(Material::matt(Vec3::ONE));
     let pane = world.query_filtered::<Entity, With<Mesh>>().single(&world).unwrap();
-    // An angle at which the four samples of the standard pattern lie at four distances from either edge.
+    // At this angle the four samples of the standard pattern are at four distances from either edge.
     let turned = Transform::from_rotation(DQuat::from_rotation_z(-0.15)).with_scale(glam::DVec3::splat(0.6));
     world.entity_mut(pane).insert(turned);
     let frame = |world: &mut World, multisample| {
@@ -54,11 +55,11 @@ fn edges_are_averages_of_four_samples() {
         seen[quarters as usize] += 1;
     }
     assert!(seen[1..4].iter().all(|count| *count > 0), "{seen:?}");
-    // The pane covers 0.36 of the frame. Its edges run through about 4 * 0.6 * 64 pixels, each counted with an error of either sign of
-    // less than half a sample's worth: 8 standard deviations of a sum of that many uniform errors of up to 1/8.
+    // The pane covers 0.36 of the frame. Its edges cross about 4 * 0.6 * 64 pixels, each with an error of either
+    // sign of less than half a sample: 8 standard deviations of a sum of that many uniform errors of up to 1/8.
     let area = four.iter().map(|pixel| pixel.x).sum::<f64>() / (SIZE * SIZE) as f64;
     let bound = 8.0 * (4.0 * 0.6 * SIZE as f64).sqrt() * 0.125 / 3.0_f64.sqrt() / (SIZE * SIZE) as f64;
     assert!((area - 0.36).abs() < bound, "{area} is not within {bound} of 0.36");
-    // Negative control: one sample per pixel is all or nothing.
+    // Negative control: with one sample per pixel it is all or nothing.
     assert!(frame(&mut world, false).iter().all(|pixel| pixel.x == 0.0 || pixel.x == 1.0));
 }

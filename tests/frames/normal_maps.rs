@@ -1,5 +1,5 @@
-//! Normal maps and occlusion textures: bumps lean where their texels say, on both faces, mirrored, turned and scaled; occlusion weakens
-//! indirect light and no other; neither leaves anything behind where a scene has none.
+//! Normal maps and occlusion textures: bumps are oriented as their texels say, on both faces, mirrored, rotated and
+//! scaled; occlusion weakens indirect light only; neither leaves anything behind in a scene without them.
 
 use std::sync::Arc;
 
@@ -21,13 +21,14 @@ use lumbre_tests::twin::{self, TwinOptions};
 use crate::adapter::{draw, linear};
 use crate::textures::{self, SIZE};
 
-/// Texels along a side of the maps here.
+/// Texels along a side of the maps in these tests.
 const TEXELS: usize = 8;
 
-/// f32 throughout: a texel of eight bits, three products and sums, a root; then the exponent of 40 times the roundings of the cosine.
+/// f32 throughout: a texel of eight bits, three products and sums, and a root; then the exponent of 40 times the
+/// roundings of the cosine.
 const BOUND: f64 = 2e-5;
 
-/// A map with slopes of all directions, none like another.
+/// A map with slopes in all directions, all different.
 fn bumps() -> Vec<[u8; 4]> {
     let texel = |at: usize| {
         let (x, y) = ((at % TEXELS) as f64, (at / TEXELS) as f64);
@@ -39,14 +40,14 @@ fn bumps() -> Vec<[u8; 4]> {
     (0..TEXELS * TEXELS).map(texel).collect()
 }
 
-/// The vector of the texel under these coordinates: right, up and out of the picture.
+/// Returns the vector of the texel at these coordinates: right, up and out of the picture.
 fn vector_at(texels: &[[u8; 4]], uv: DVec2) -> DVec3 {
     let at = (uv - uv.floor()) * TEXELS as f64;
     let texel = texels[at.y as usize * TEXELS + at.x as usize];
     DVec3::new(texel[0].into(), texel[1].into(), texel[2].into()) / 127.5 - 1.0
 }
 
-/// Whether f32 may fall on the other side of an edge between texels.
+/// Returns true if f32 may be on the other side of an edge between texels.
 fn on_an_edge(uv: DVec2) -> bool {
     let at = uv * TEXELS as f64;
     (at - at.round()).abs().min_element() < 1e-4
@@ -75,7 +76,7 @@ fn lamp() -> (Light, Transform) {
     (Light::point(Vec3::splat(3.0)), Transform::from_xyz(0.6, -0.4, 1.5))
 }
 
-/// A pane with textures, placed as told, a lamp, and a camera that sees it from edge to edge.
+/// A pane with textures and the given transform, a lamp, and a camera whose frame the pane fills exactly.
 fn scene(mesh: TriangleMesh, textures: MaterialTextures, material: Material, place: Transform) -> World {
     let mut world = World::new();
     world.spawn((Mesh(Arc::new(mesh)), material, textures, place));
@@ -85,7 +86,7 @@ fn scene(mesh: TriangleMesh, textures: MaterialTextures, material: Material, pla
     world
 }
 
-/// What a pixel shows whose unit normal is known, lit and seen from `side` (1 or -1 along z).
+/// Returns the colour of a pixel with a known unit normal, lit and seen from `side` (1 or -1 along z).
 fn lit_pixel(x: usize, y: usize, normal: DVec3, side: f64) -> DVec3 {
     let (light, place) = lamp();
     let point = pixel_point(x, y, SIZE);
@@ -112,7 +113,7 @@ fn bumps_lean_where_their_texels_say() {
             let normal = |x, y| (vector_at(&texels, pixel_uv(x, y, SIZE)) * factor).normalize();
             let right = difference(&mut world, |x, y| Some(lit_pixel(x, y, normal(x, y), 1.0)));
             assert!(right.largest < BOUND, "scale {scale}: {right:?}");
-            // Negative controls: green the other way round (DirectX's maps), and no map at all.
+            // Negative controls: inverted green (as in DirectX's maps), and no map at all.
             let down = |x, y| Some(lit_pixel(x, y, normal(x, y) * DVec3::new(1.0, -1.0, 1.0), 1.0));
             let flat = |x, y| Some(lit_pixel(x, y, DVec3::Z, 1.0));
             for wrong in [difference(&mut world, down), difference(&mut world, flat)] {
@@ -124,7 +125,7 @@ fn bumps_lean_where_their_texels_say() {
 
 #[test]
 fn a_files_tangents_are_followed() {
-    // Tangents that point up instead of right, of either side: red leans along y, green along -x or x.
+    // Tangents that point up instead of right, with both handednesses: red leans along y, green along -x or x.
     let texels = bumps();
     for side in [1.0, -1.0] {
         let mesh = TriangleMesh { tangents: vec![Vec4::new(0.0, 1.0, 0.0, side as f32); 4], ..pane() };
@@ -153,7 +154,7 @@ fn a_turned_picture_turns_its_bumps() {
         let turn = DMat2::from_cols(DVec2::new(cos, -sin), DVec2::new(sin, cos));
         let linear = turn * DMat2::from_diagonal(scale.as_dvec2());
         let inverse = linear.inverse();
-        // Where the picture's right and up lie on the pane: u runs right, v down.
+        // The directions on the pane of the picture's right and up: u increases to the right, v downwards.
         let on_pane = |step: DVec2| DVec3::new(step.x, -step.y, 0.0).normalize();
         let (right, up) = (on_pane(inverse * DVec2::X), on_pane(inverse * DVec2::NEG_Y));
         let expected = |right: DVec3, up: DVec3| {
@@ -191,7 +192,7 @@ fn a_mirrored_node_shows_the_mirrored_bumps() {
         };
         let found = difference(&mut world, expected(scale));
         assert!(found.largest < BOUND, "{scale}: {found:?}");
-        // Negative control: bumps that stay as they were while the picture is mirrored.
+        // Negative control: bumps that stay the same while the picture is mirrored.
         assert!(difference(&mut world, expected(DVec3::ONE)).largest > 0.1, "{scale}");
     }
 }
@@ -199,7 +200,8 @@ fn a_mirrored_node_shows_the_mirrored_bumps() {
 #[test]
 fn the_back_of_a_bump_is_a_dent() {
     let texels = bumps();
-    // Seen and lit from behind: the pane is turned half round its y axis, so that pixels see the picture mirrored.
+    // Seen and lit from behind: the pane is rotated by half a turn about its y axis, so that the picture appears
+    // mirrored.
     let place = Transform::from_rotation(DQuat::from_rotation_y(std::f64::consts::PI));
     let material = Material { double_sided: true, ..shiny() };
     let mut world = scene(pane(), with_map(normal_map(&texels)), material, place);
@@ -207,14 +209,14 @@ fn the_back_of_a_bump_is_a_dent() {
         let texels = &texels;
         move |x: usize, y| {
             let vector = vector_at(texels, pixel_uv(SIZE - 1 - x, y, SIZE));
-            // Turned half round, then reversed for the back.
+            // Rotated by half a turn, then reversed for the back.
             let normal = DVec3::new(-vector.x, vector.y, -vector.z).normalize();
             Some(lit_pixel(x, y, outward * normal, 1.0))
         }
     };
     let found = difference(&mut world, expected(-1.0));
     assert!(found.largest < BOUND, "{found:?}");
-    // Without two-sided lighting it is lit as the front, which faces away from the lamp.
+    // Without two-sided lighting it is lit like the front, which faces away from the lamp.
     world.resource_mut::<SceneSettings>().two_sided = false;
     let found = difference(&mut world, expected(1.0));
     assert!(found.largest < BOUND, "{found:?}");
@@ -244,10 +246,10 @@ fn what_has_no_direction_is_as_if_there_were_no_map() {
         let got = flat(scene(mesh, textures, shiny(), Transform::IDENTITY));
         let largest =
             got.iter().zip(&expected).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f64::max);
-        // The exponent goes through 2/alpha^2 - 2 and back.
+        // The exponent is converted to alpha^2 and back as 2/alpha^2 - 2.
         assert!(largest < BOUND, "{name}: {largest}");
     }
-    // Any picture of these is finite: `draw` looks.
+    // All of these pictures are finite, which `draw` checks.
     for (mesh, scale) in [(line, 1.0), (pane(), f32::NAN), (pane(), f32::MAX), (pane(), -1e30)] {
         let map = NormalTexture { scale, ..normal_map(&bumps()) };
         flat(scene(mesh, with_map(map), shiny(), Transform::IDENTITY));
@@ -261,7 +263,7 @@ fn what_has_no_direction_is_as_if_there_were_no_map() {
     );
 }
 
-/// A bumpy ball, turned, flattened and mirrored, with a map that is filtered; also on its back side.
+/// Two bumpy tori, rotated and stretched, one of them mirrored, with a filtered map.
 fn balls(model: ReflectionModel, double_sided: bool) -> World {
     let mut world = World::new();
     let texture = TextureReference {
@@ -306,12 +308,13 @@ fn bumpy_bodies_agree_with_the_twin() {
             let found = compare(&got, &expected);
             println!("{:16} two-sided {double_sided}, filtered {filtered}: {found:?}", model.name());
             assert!(found.pixels > 1500, "{found:?}");
-            // Texture units hold the weights between texels in 8 bits (D3D's and Vulkan's least precision): 1/256 of the change from
-            // texel to texel, up to 0.6 here, turns a normal by 2e-3, and the exponents of 40 and 160 turn that into these.
+            // Texture units have the weights between texels in 8 bits (the minimum precision of D3D and Vulkan):
+            // 1/256 of the change between texels, up to 0.6 here, turns a normal by 2e-3, and the exponents of 40
+            // and 160 turn that into this bound.
             const NEAR: f64 = 0.05;
             if *model == ReflectionModel::BlinnMatched {
-                // Its exponent is 0 where the light grazes, and its highlight ends there at full height: a fragment at that line is on
-                // either side.
+                // Its exponent is 0 at grazing light, so its highlight ends there at full height, and a fragment on
+                // that line may be on either side.
                 let far = |(got, expected): (&Option<DVec3>, &Option<DVec3>)| {
                     got.zip(*expected).is_some_and(|(a, b)| (a - b).abs().max_element() > NEAR)
                 };
@@ -320,7 +323,7 @@ fn bumpy_bodies_agree_with_the_twin() {
             } else {
                 assert!(found.largest < NEAR && found.relative_l2 < 5e-3, "{}: {found:?}", model.name());
             }
-            // Negative control: the same bodies without their maps.
+            // Negative control: the same objects without their maps.
             let mut plain = balls(*model, double_sided);
             let mapped: Vec<Entity> =
                 plain.query_filtered::<Entity, With<MaterialTextures>>().iter(&plain).collect();
@@ -336,8 +339,8 @@ fn bumpy_bodies_agree_with_the_twin() {
 
 #[test]
 fn a_map_seen_from_afar_has_the_highlight_of_what_it_averages() {
-    // Slopes that repeat many times within a pixel, under a light whose highlight the pane shows. What a pixel holds is known from a frame
-    // that is sixteen times finer, without mip levels.
+    // Slopes that repeat many times within a pixel, under a light whose highlight is on the pane. The reference for
+    // a pixel is a frame with sixteen times the resolution, without mip levels.
     let (size, finer) = (24u32, 16u32);
     let mut map = normal_map(&bumps());
     map.texture.scale = Vec2::splat(24.0 * 2.0);
@@ -363,10 +366,10 @@ fn a_map_seen_from_afar_has_the_highlight_of_what_it_averages() {
         let squares: f64 = got.iter().zip(&held).map(|(a, b)| (*a - *b).length_squared()).sum();
         (squares / held.iter().map(|pixel| pixel.length_squared()).sum::<f64>()).sqrt()
     };
-    // Without the spread a minified map is a smooth plane with the bare highlight.
+    // Without the spread a minified map is a smooth plane with the plain highlight.
     let (filtered, smooth) = (error(&frame(Some(map), size)), error(&frame(None, size)));
     println!("relative error of a minified map: {filtered:.4}, without its spread {smooth:.4}");
-    // The slopes reach 30 degrees, beyond what a lobe of one width tells: measured 0.137 and 0.400.
+    // The slopes reach 30 degrees, more than a lobe of one width can represent: measured 0.137 and 0.400.
     assert!(filtered < 0.15 && filtered < 0.4 * smooth, "{filtered} against {smooth}");
 }
 
@@ -384,7 +387,7 @@ fn no_map_leaves_nothing_behind() {
     let without = explained(MaterialTextures::default(), &options);
     assert!(without.variants.keys().all(|variant| !variant.contains("TEXTURE")), "{:?}", without.variants);
     assert!(without.to_text().contains("- normal textures: no material has one"));
-    // Flat and Gouraud shading light no fragment: the same frames, bit for bit, and the same shaders.
+    // Flat and Gouraud shading light no fragments: the same frames, bit for bit, and the same shaders.
     for shading in [Shading::Flat, Shading::Gouraud] {
         let options = FrameOptions { shading: Some(shading), ..linear() };
         let variants = |textures| explained(textures, &options).variants;
@@ -395,7 +398,7 @@ fn no_map_leaves_nothing_behind() {
         };
         assert_eq!(frame(bumpy.clone()), frame(MaterialTextures::default()), "{}", shading.name());
     }
-    // A mesh with tangents and no map is drawn as one without tangents.
+    // A mesh with tangents and no map is drawn like one without tangents.
     let mesh = pane().with_tangents(TextureCoordinateSet::First).unwrap();
     let frame = |mesh| {
         let mut world = scene(mesh, MaterialTextures::default(), shiny(), Transform::IDENTITY);
@@ -405,7 +408,7 @@ fn no_map_leaves_nothing_behind() {
 }
 
 fn occlusion_map(strength: f32) -> MaterialTextures {
-    // Red is read; green and blue are not.
+    // Only red is read.
     let texels: Vec<[u8; 4]> = (0..TEXELS * TEXELS).map(|at| [(at * 4) as u8, 9, 200, 255]).collect();
     let texture = sharp(&image(TEXELS as u32, &texels));
     MaterialTextures {
@@ -427,7 +430,7 @@ fn occlusion_weakens_indirect_light_and_no_other() {
                 let lamp = world.query_filtered::<Entity, With<Light>>().single(&world).unwrap();
                 world.despawn(lamp);
             } else {
-                // A part of the lamp's own that stands for its bounces.
+                // Ambient light of the lamp itself, which stands for its bounces.
                 let mut lights = world.query::<&mut Light>();
                 lights.single_mut(&mut world).unwrap().ambient = Vec3::splat(ambient);
             }
@@ -449,7 +452,7 @@ fn occlusion_weakens_indirect_light_and_no_other() {
                 assert!(apart < 3e-6, "{} strength {strength}: {} {expected}", shading.name(), got[at]);
             }
         }
-        // Negative control: it is a pattern that one would see.
+        // Negative control: the pattern is strong enough to be visible.
         let occluded = frame(occlusion_map(1.0), 1.0, false);
         let whole = frame(MaterialTextures::default(), 1.0, false);
         let apart =
@@ -487,7 +490,7 @@ fn occlusion_weakens_a_lightmap_and_bumps_leave_it_alone() {
 
 #[test]
 fn one_image_may_be_roughness_and_occlusion() {
-    // The usual packing: red occlusion, green roughness, blue metal. Uploaded once, read by both.
+    // The usual packing: red is occlusion, green roughness, blue metalness. It is uploaded once and read by both.
     let packed: Arc<Image> = image(1, &[[128, 200, 0, 255]]);
     let textures = MaterialTextures {
         metallic_roughness: Some(lumbre_scene::MetallicRoughnessTexture {

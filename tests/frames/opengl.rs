@@ -1,5 +1,5 @@
-//! OpenGL's fixed-function pictures that lie in tests/opengl (its README says who drew them and how): a frame with
-//! `--display clamp` equals them, and stops doing so when anything of the scene changes.
+//! OpenGL's fixed-function pictures in tests/opengl (its README describes how they were drawn): a frame with
+//! `--display clamp` equals them, and no longer does when anything in the scene changes.
 
 use std::path::PathBuf;
 
@@ -29,19 +29,20 @@ const CASES: &[&str] = &[
 
 /// Largest difference per channel inside one surface: one code of eight bits.
 pub const LARGEST: f64 = 1.0 / 255.0;
-/// Mean absolute difference there.
+/// Largest mean absolute difference there.
 pub const MEAN: f64 = 1e-4;
-/// What the cases here are held to. Both sides are f32; measured 1.1e-5 and 3.9e-6, of which the files' rounding to 2^-16 makes
-/// up to 7.6e-6 and 3.8e-6. A highlight's power is what differs most: exponent 128 times the error of a logarithm in f32.
+/// The stricter bounds of the cases here. Both sides are f32; measured 1.1e-5 and 3.9e-6, of which up to 7.6e-6 and
+/// 3.8e-6 are the files' rounding to 2^-16. A highlight's power differs most: exponent 128 times the error of a
+/// logarithm in f32.
 const LARGEST_HERE: f64 = 1e-4;
 const MEAN_HERE: f64 = 1e-5;
 
-/// How OpenGL is asked of this renderer.
+/// The options with which this renderer draws like OpenGL.
 pub fn opengl_options() -> FrameOptions {
     FrameOptions { display: Display::Clamp, ..linear() }
 }
 
-/// Whether a frame equals OpenGL's as it has to.
+/// Returns true if a frame equals OpenGL's within the general bounds.
 pub fn equal(difference: &Difference) -> bool {
     difference.largest <= LARGEST && difference.mean <= MEAN
 }
@@ -49,7 +50,7 @@ pub fn equal(difference: &Difference) -> bool {
 struct Reference {
     scene: PathBuf,
     size: (u32, u32),
-    /// Colours at pixels whose 3x3 neighbourhood is one surface, or one triangle of a flat one.
+    /// Colours of pixels whose 3x3 neighbourhood is one surface, or one triangle of a flat one.
     interior: Vec<Option<DVec3>>,
 }
 
@@ -80,7 +81,7 @@ impl Reference {
 
     fn difference(&self, world: &mut World, options: &FrameOptions) -> Difference {
         let (got, _) = draw(world, self.size.0, self.size.1, options);
-        // Where the display does not clamp, as one control has it, the picture is clamped at its end only.
+        // Where the display does not clamp, as in one control, the picture is clamped only at the end.
         let got: Vec<_> = got.into_iter().map(|color| Some(color.clamp(DVec3::ZERO, DVec3::ONE))).collect();
         compare(&got, &self.interior)
     }
@@ -102,7 +103,7 @@ fn frames_equal_opengl() {
 
 type Change = fn(&mut World, &mut FrameOptions);
 
-/// Small errors that a renderer could make, each in a case that has to show it.
+/// Small errors that a renderer could make, each in a case that has to reveal it.
 const ERRORS: &[(&str, &str, Change)] = &[
     ("one_point_light", "exponent 2 for 1", |world, _| shininess(world, 1.0)),
     ("one_point_light", "attenuation's linear term", |world, _| {

@@ -1,5 +1,5 @@
-//! Effects from outside of the renderer: integrations/own_program's bloom and outline are drawn without a line about them in the core, and without a trace
-//! where the scene does not call for them.
+//! Effects from outside the renderer: bloom and outline of integrations/own_program are drawn without any code for
+//! them in the core, and leave no trace where the scene does not call for them.
 
 #[path = "../../integrations/own_program/src/bloom.rs"]
 pub mod bloom;
@@ -90,7 +90,7 @@ fn bloom_spreads_light_and_keeps_its_energy() {
         ..Material::matt(Vec3::ZERO)
     };
     let (mut world, ball, camera) = ball(lamp);
-    // Small and in the middle, so that next to nothing of its glow is lost past the frame's edge.
+    // Small and in the middle, so that almost none of its glow is lost outside the frame.
     world.entity_mut(ball).insert(Transform { scale: DVec3::splat(0.2), ..Transform::IDENTITY });
     let mut renderer = with_both();
     let sharp = radiance(&mut renderer, &mut world);
@@ -105,12 +105,12 @@ fn bloom_spreads_light_and_keeps_its_energy() {
     assert!(near.min_element() > 0.0 && near.x > near.y && near.y > near.z, "it glows in its colour: {near}");
     let far = at(&glowing, 64, 20);
     assert!(far.x < near.x, "less farther away: {far} {near}");
-    // A frame of a target of eight bits goes by the linear frame then, with a display pass.
+    // A frame for a target of eight bits then has a linear frame and a display pass.
     let target = Offscreen::new(gpu(), SIZE, SIZE, OffscreenFormat::Rgba8).unwrap();
     let report = renderer.render(&mut world, &target.target(), &FrameOptions::default()).unwrap();
     let run: Vec<_> = report.plan.running().collect();
     assert!(run.contains(&"display") && run.contains(&"bloom"), "{run:?}");
-    // Without the component it is as before, to the bit.
+    // Without the component it is bit for bit as before.
     world.entity_mut(camera).remove::<Bloom>();
     assert_eq!(radiance(&mut renderer, &mut world), sharp);
 }
@@ -120,7 +120,7 @@ fn an_outline_is_a_rim_of_its_width_around_its_object_and_nothing_else() {
     for multisample in [false, true] {
         let options = FrameOptions { multisample: Some(multisample), ..FrameOptions::default() };
         let (mut world, ball, _) = ball(Material::matt(Vec3::ONE));
-        // A wall before it: the outline is seen through it.
+        // A wall in front of it, through which the outline is visible.
         let wall = Mesh(Arc::new(shapes::cuboid(Vec3::new(0.5, 4.0, 0.1), 1)));
         world.spawn((wall, Material::matt(Vec3::splat(0.5)), Transform::from_xyz(0.9, 0.0, 2.0)));
         let mut renderer = with_both();
@@ -183,7 +183,7 @@ fn effects_that_say_that_they_are_still_let_a_frame_be_kept() {
         report.plan.running().count() > 0
     };
     assert!(drawn(&mut world));
-    // Transforms were propagated, which is a change once.
+    // Transforms are propagated in the first frame, which counts as a change.
     drawn(&mut world);
     assert!(!drawn(&mut world));
     world.get_mut::<Bloom>(camera).unwrap().strength = 0.5;

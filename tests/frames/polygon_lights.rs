@@ -1,4 +1,5 @@
-//! Emissive polygons as lights: frames against the f64 twin, against thousands of point lights, and what switching them leaves behind.
+//! Emissive polygons as lights: frames compared with the f64 twin and with thousands of point lights, and what
+//! remains when they are switched off.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -19,11 +20,11 @@ use crate::adapter::{Canvas, draw, linear};
 
 const SIZE: usize = 144;
 
-/// f32 against f64, of radiances up to about 2 here. The form factor is good to 2·10⁻⁶, see lumbre_optics; highlights add 16 powers with
-/// n = 40, each good to 40·4·2⁻²⁴ = 10⁻⁵ relative, of a sum near 0.3, at points whose places along the lamp have a few ulp. Measured:
-/// 9·10⁻⁶ at most, where a lamp all but touches the floor.
+/// f32 compared with f64, for radiances up to about 2 here. The form factor is good to 2·10⁻⁶, see lumbre_optics.
+/// Highlights add 16 powers with n = 40, each good to 40·4·2⁻²⁴ = 10⁻⁵ relative, of a sum near 0.3, at points whose
+/// positions along the lamp are off by a few ulp. Measured: at most 9·10⁻⁶, where a lamp almost touches the floor.
 const LARGEST: f64 = 2e-5;
-/// The same averaged: measured 4·10⁻⁷ at most.
+/// The mean of the same errors: measured at most 4·10⁻⁷.
 const RELATIVE_L2: f64 = 1e-6;
 
 fn glowing(radiance: Vec3) -> Material {
@@ -43,7 +44,7 @@ fn shiny(shininess: f32) -> Material {
     Material { front, ..Material::default() }
 }
 
-/// A rectangle of 1.6 m by 0.8 m that faces down, at the transform's place.
+/// A rectangle of 1.6 m by 0.8 m that faces down, to be placed by a transform.
 fn panel() -> Mesh {
     let corner = |x: f32, z: f32| Vec3::new(0.8 * x, 0.0, 0.4 * z);
     Mesh(Arc::new(TriangleMesh {
@@ -54,7 +55,7 @@ fn panel() -> Mesh {
     }))
 }
 
-/// A floor and a ball under a tilted lamp that is seen as well. The lamp is the last entity.
+/// A floor and a ball under a tilted lamp that is visible too. The lamp is the last entity.
 fn studio(shininess: f32) -> (World, Entity) {
     let mut world = World::new();
     world.spawn((Mesh(Arc::new(shapes::plane(6.0, 6.0, 12, 12))), shiny(shininess)));
@@ -120,13 +121,13 @@ fn triangles_boxes_and_mirrored_lamps_agree_with_the_twin() {
     }
 }
 
-/// The studio's lamp as a grid of point lights that shine by its cosine: I = L A cos θ' each, a spot of exponent 1 and cutoff 90
-/// degrees.
+/// Replaces the studio's lamp by a grid of point lights with a cosine distribution: I = L A cos θ' each, a
+/// spotlight with exponent 1 and a cutoff of 90 degrees.
 fn as_points(world: &mut World, lamp: Entity, columns: u32, rows: u32) {
     let place = world.get::<Transform>(lamp).unwrap().affine();
     let radiance = world.get::<Material>(lamp).unwrap().front.emission;
     let area = 1.6 * 0.8 / f64::from(columns * rows);
-    // What multiplies k_d is intensity/π.
+    // The factor on k_d is intensity/π.
     let color = radiance * (area / std::f64::consts::PI) as f32;
     let cone = SpotCone::Exponent { cutoff: std::f32::consts::FRAC_PI_2, exponent: 1.0 };
     let down = place.transform_vector3(-DVec3::Y);
@@ -149,8 +150,8 @@ fn as_points(world: &mut World, lamp: Entity, columns: u32, rows: u32) {
 
 #[test]
 fn thousands_of_point_lights_come_to_the_same() {
-    // Matt, so that the closed form is what is compared; the lamp ends half a metre from the floor at the least, the points are 2.5 cm
-    // apart: the midpoint rule is off by (2.5 cm/d)² times a few, 1e-4 a metre away.
+    // Matt, so that the closed form is compared. The lamp is at least half a metre from the floor, and the points
+    // are 2.5 cm apart: the midpoint rule is off by (2.5 cm/d)² times a few, 1e-4 at a metre.
     let matt = |world: &mut World| {
         let mut materials = world.query::<&mut Material>();
         materials.iter_mut(world).for_each(|mut material| material.front.specular = Vec3::ZERO);
@@ -171,7 +172,7 @@ fn thousands_of_point_lights_come_to_the_same() {
         apart.push(difference.largest);
     }
     assert!(apart[2] < 5e-4, "{apart:?}");
-    // Twice the points along each edge: a quarter of the error.
+    // Twice the points along each edge give a quarter of the error.
     assert!(apart[1] < 0.35 * apart[0], "{apart:?}");
 }
 
@@ -187,7 +188,8 @@ fn sixteen_points_make_the_highlight_of_thousands() {
         let some = |pixels: &[DVec3]| pixels.iter().copied().map(Some).collect::<Vec<_>>();
         let difference = compare(&some(&few), &some(&many));
         println!("n = {shininess}: {difference:?}, brightest {brightest}");
-        // lumbre_optics states up to 8 % of the brightest highlight; here the diffuse part is under it: measured 1 %.
+        // lumbre_optics states up to 8 % of the brightest highlight; with the diffuse part added here, 1 % was
+        // measured.
         assert!(difference.largest < 0.02 * brightest, "{shininess}: {difference:?} of {brightest}");
     }
 }
@@ -216,7 +218,7 @@ fn a_carried_lamp_lights_where_it_goes_and_a_hidden_one_leaves_nothing_behind() 
     world.entity_mut(lamp).remove::<EmissiveLight>();
     let (dark, report) = canvas.draw(&mut world, &linear());
     assert!(!knows_polygons(&mut world) && report.statistics.lights == 0);
-    // What is left is ambient light and the lamp's own glow, as the documents have emission.
+    // What remains is ambient light and the lamp's own glow, which is emission as in the documents.
     let expected = twin::draw(&mut world, SIZE, SIZE, TwinOptions::default()).inside_surfaces(false);
     assert!(compare(&some(dark), &expected).largest < LARGEST);
     world.entity_mut(lamp).insert((EmissiveLight, Hidden));
@@ -267,7 +269,7 @@ fn beside_other_lights_and_behind_the_lamp() {
     let some = |pixels: Vec<DVec3>| pixels.into_iter().map(Some).collect::<Vec<_>>();
     for angle in [0.0, 0.9, 2.5] {
         world.get_mut::<Transform>(lamp).unwrap().rotation = DQuat::from_rotation_z(angle);
-        // Low enough that the lamp's plane cuts the ball and the floor, and their horizons the lamp.
+        // Low enough for the lamp's plane to cut the ball and the floor, and for their horizons to cut the lamp.
         world.get_mut::<Transform>(lamp).unwrap().translation = DVec3::new(-0.5, 0.9, 0.1);
         let (got, _) = draw(&mut world, SIZE as u32, SIZE as u32, &linear());
         let expected = twin::draw(&mut world, SIZE, SIZE, TwinOptions::default()).inside_surfaces(false);
@@ -282,7 +284,7 @@ fn beside_other_lights_and_behind_the_lamp() {
 
 #[test]
 fn touching_lamps_far_lamps_and_slivers_stay_finite() {
-    // The probe of `draw` looks for NaN and infinities; none of these may add light to the background either.
+    // The probe in `draw` looks for NaN and infinities; none of these may add light to the background either.
     for (height, scale) in
         [(0.0, 1.0), (1e-6, 1.0), (1e-3, 1.0), (0.6, 1e-6), (0.6, 1e4), (1e5, 1.0), (1.2, 0.0)]
     {
@@ -298,7 +300,7 @@ fn touching_lamps_far_lamps_and_slivers_stay_finite() {
 
 #[test]
 fn what_a_polygon_costs_beside_a_point_light() {
-    // Times are printed and not asserted: other programs run beside this one.
+    // Times are printed and not asserted, as other programs may be running.
     let seconds = |polygon: bool, specular: f32, count: u32| {
         let (mut world, lamp) = studio(40.0);
         let mut materials = world.query::<&mut Material>();

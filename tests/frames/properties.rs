@@ -1,5 +1,5 @@
-//! What holds for frames of any materials and lights: three shadings that agree where they must, light that adds up, lights in any
-//! order and number, switched off, moved and carried.
+//! Properties of frames with any materials and lights: the three shadings agree where they must, light adds up, and
+//! lights may be in any order and number, switched off, moved and carried.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ const SIZE: u32 = 32;
 /// Half of f32's step at 1.
 const ROUNDING: f64 = 5.960_464_5e-8;
 
-/// Never quite black, so that whatever adds to a frame is seen.
+/// Never entirely black, so that everything that adds to a frame is visible.
 fn color() -> impl Strategy<Value = Vec3> {
     [0.05..1.0f32, 0.05..1.0f32, 0.05..1.0f32].prop_map(Vec3::from)
 }
@@ -42,13 +42,13 @@ fn model() -> impl Strategy<Value = ReflectionModel> {
     prop::sample::select(ReflectionModel::ALL.to_vec())
 }
 
-/// A place on the viewer's side, two to four metres from the origin.
+/// A position on the viewer's side, two to four metres from the origin.
 fn place() -> impl Strategy<Value = DVec3> {
     ([-1.0..1.0f64, -1.0..1.0f64, 0.2..1.0f64], 2.0..4.0f64)
         .prop_map(|(direction, distance)| DVec3::from(direction).normalize() * distance)
 }
 
-/// Any kind of light, turned towards the origin.
+/// Any kind of light, aimed at the origin.
 fn light() -> impl Strategy<Value = (Light, DVec3)> {
     (0..every_light().len(), color(), color(), color(), place()).prop_map(
         |(kind, ambient, diffuse, specular, place)| {
@@ -66,7 +66,7 @@ fn add_light(world: &mut World, (light, place): &(Light, DVec3)) -> Entity {
     world.spawn((light.clone(), place)).id()
 }
 
-/// A ball of a material under these lights.
+/// A ball with a material under these lights.
 fn ball(surface: Surface, model: ReflectionModel, lights: &[(Light, DVec3)]) -> World {
     let mut world = ball_of(shapes::uv_sphere(1.0, 16, 8), Light::ambient(Vec3::ZERO));
     let only = world.query_filtered::<Entity, With<Light>>().single(&world).unwrap();
@@ -109,7 +109,7 @@ fn largest(pixels: &[DVec3]) -> f64 {
     pixels.iter().map(|pixel| pixel.max_element()).fold(0.0, f64::max)
 }
 
-/// The largest difference of any channel.
+/// Returns the largest difference of any channel.
 fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f64::max)
 }
@@ -134,8 +134,9 @@ proptest! {
             .map(|shading| canvas.draw(&mut world, &FrameOptions { shading: Some(shading), ..linear() }).0);
         let size = largest(&phong);
         prop_assert!(size > 0.0 && flat.iter().all(|pixel| pixel.max_element() > 0.0), "the plane fills the frame");
-        // One normal in three spellings: from the vertices, interpolated, and from the corners. Their roundings of some 2^-23 reach
-        // the cosine of the lobe, whose power multiplies them by n; interpolation of equal numbers adds a few roundings more.
+        // The same normal computed in three ways: from the vertices, interpolated, and from the corners. Their
+        // roundings of some 2^-23 affect the cosine of the lobe, whose power multiplies them by n; interpolating
+        // equal numbers adds a few more roundings.
         let bound = (4.0 * f64::from(surface.shininess) + 16.0) * ROUNDING * size * 4.0;
         prop_assert!(apart(&gouraud, &phong) < bound, "Gouraud and Phong: {} > {bound}", apart(&gouraud, &phong));
         prop_assert!(apart(&flat, &phong) < bound, "flat and Phong: {} > {bound}", apart(&flat, &phong));
@@ -163,11 +164,11 @@ proptest! {
         let (none, one, more) = (with(0.0), with(1.0), with(factor));
         let expected: Vec<DVec3> =
             none.iter().zip(&one).map(|(none, one)| *none + (*one - *none) * f64::from(factor)).collect();
-        // Each of the three frames has rounded a sum of a dozen terms; the first two are multiplied by the factor.
+        // Each of the three frames is a rounded sum of a dozen terms; the first two are multiplied by the factor.
         let size = largest(&more).max(largest(&one));
         let bound = 12.0 * ROUNDING * size * (2.0 + f64::from(factor));
         prop_assert!(apart(&more, &expected) < bound, "{} > {bound}", apart(&more, &expected));
-        // All light together times a power of two: to the bit.
+        // All light together times a power of two is exact.
         let mut twice = lights.clone();
         for (light, _) in &mut twice {
             light.ambient *= 2.0;
@@ -192,11 +193,11 @@ proptest! {
         order.reverse();
         order.rotate_left(turn % lights.len());
         let other = frame(&mut ball(surface, model, &order));
-        // A sum of as many terms, rounded in another order.
+        // A sum of the same terms, rounded in another order.
         let size = largest(&together);
         let bound = (2.0 * lights.len() as f64 + 2.0) * ROUNDING * size;
         prop_assert!(apart(&together, &other) <= bound, "{} > {bound}", apart(&together, &other));
-        // And of the lights one by one, each over the frame without any.
+        // Also for the sum of the lights one by one, each minus the frame without any.
         let none = frame(&mut ball(surface, model, &[]));
         let mut sum = none.clone();
         for light in &lights {
@@ -258,8 +259,9 @@ fn the_shadings_differ_on_a_plane_under_a_near_light_or_a_near_viewer() {
 
 #[test]
 fn gouraud_becomes_phong_at_order_two_when_the_sphere_is_subdivided() {
-    // Linear interpolation of a smooth function is wrong by h^2 / 8 of its second derivative: each halving of the edges quarters it.
-    // The light comes from near the viewer, so that no terminator, where the function has a kink, lies in what is compared.
+    // Linear interpolation of a smooth function is off by h^2 / 8 of its second derivative, so halving the edges
+    // quarters the error. The light is near the viewer, so that the terminator, where the function has a kink, is
+    // not part of the comparison.
     const WIDE: u32 = 192;
     let surface = Surface {
         ambient: Vec3::splat(0.1),
@@ -280,13 +282,13 @@ fn gouraud_becomes_phong_at_order_two_when_the_sphere_is_subdivided() {
             *of_ball = Mesh(Arc::new(mesh.clone()));
         }
         for mut place in world.query_filtered::<&mut Transform, With<Mesh>>().iter_mut(&mut world) {
-            // So that neither a vertex nor an edge of the first tetrahedron looks at the camera.
+            // Rotated so that neither a vertex nor an edge of the first tetrahedron faces the camera.
             place.rotation = DQuat::from_rotation_y(0.4) * DQuat::from_rotation_x(0.9);
         }
         add_light(&mut world, &(Light::directional(Vec3::ONE), DVec3::new(0.2, 0.4, 3.0)));
         let [gouraud, phong] = [Shading::Gouraud, Shading::Phong]
             .map(|shading| canvas.draw(&mut world, &FrameOptions { shading: Some(shading), ..linear() }).0);
-        // The ball's middle, within 0.8 of its radius: 3.6 m away, seen at an angle of 0.9 across the frame.
+        // The middle of the ball, within 0.8 of its radius: 3.6 m away, seen at an angle of 0.9 across the frame.
         let radius = 0.8 / 3.6 / (0.45f64).tan() * 0.5 * f64::from(WIDE);
         let inside = |index: &usize| {
             let offset = |i: usize| i as f64 + 0.5 - 0.5 * f64::from(WIDE);
@@ -306,20 +308,21 @@ fn gouraud_becomes_phong_at_order_two_when_the_sphere_is_subdivided() {
         assert!(errors.len() > 5000, "{} pixels are too few", errors.len());
         (before, last) = (Some(now), order);
     }
-    // In the limit; the largest error moves from triangle to triangle and needs more room.
+    // The order in the limit; the largest error moves from triangle to triangle and needs more tolerance.
     assert!((last[1] - 2.0).abs() < 0.15, "order of the mean: {}", last[1]);
     assert!((last[0] - 2.0).abs() < 0.5, "order of the largest: {}", last[0]);
 }
 
 #[test]
 fn any_number_of_lights() {
-    // OpenGL has eight; one more and many more are as good. Against the twin, which has no lists of lights.
+    // OpenGL has eight lights; one more and many more must work equally. The reference is the twin, which has no
+    // lists of lights.
     let surface = Surface { specular: Vec3::splat(0.4), shininess: 30.0, ..Surface::default() };
     let kinds = every_light();
     for count in [0usize, 1, 8, 9, 64] {
         let lights: Vec<(Light, DVec3)> = (0..count)
             .map(|number| {
-                let turn = number as f64 * 2.399_963; // The golden angle spreads them.
+                let turn = number as f64 * 2.399_963; // The golden angle distributes them.
                 let place = DVec3::new(2.5 * turn.cos(), 2.5 * turn.sin(), 1.0 + (number % 5) as f64 * 0.5);
                 let (_, mut light) = kinds[number % kinds.len()].clone();
                 let share = Vec3::new(0.5 + 0.5 * turn.cos() as f32, 0.5, 0.5 + 0.5 * turn.sin() as f32)
@@ -333,13 +336,13 @@ fn any_number_of_lights() {
         let mut world = ball(surface, ReflectionModel::Phong, &lights);
         let expected = twin::draw(&mut world, 96, 96, TwinOptions::default()).inside_surfaces(false);
         let (got, report) = draw(&mut world, 96, 96, &linear());
-        // Ambient lights have no place in a list: they are one sum for the whole frame.
+        // Ambient lights are not in any list: they are one sum for the whole frame.
         let placed = lights.iter().filter(|(light, _)| light.kind != LightKind::Ambient).count();
         assert_eq!(report.statistics.lights as usize, placed);
         let difference = compare(&got.iter().copied().map(Some).collect::<Vec<_>>(), &expected);
         println!("{count:3} lights: {difference:?}");
         assert!(difference.pixels > 1000, "{difference:?}");
-        // As balls.rs, of lights that are together as bright as one.
+        // As in balls.rs, for lights that are together as bright as one.
         assert!(difference.largest < 1e-4, "{count} lights: {difference:?}");
         if count > 0 {
             // Negative control: the last one is seen.
@@ -352,7 +355,7 @@ fn any_number_of_lights() {
 
 #[test]
 fn a_light_carried_by_an_object_moves_with_it() {
-    // A lamp on an arm of a body that flies about, against a lamp at the same place that nobody carries.
+    // A lamp on an arm of a moving body, compared with a free lamp at the same position.
     let surface = Surface { specular: Vec3::splat(0.4), shininess: 20.0, ..Surface::default() };
     let lamp = Light::spot(Vec3::splat(12.0), SpotCone::Exponent { cutoff: 0.5, exponent: 8.0 });
     let arm = Transform::from_xyz(0.3, 0.2, -0.1).with_rotation(DQuat::from_rotation_y(0.2));
@@ -373,17 +376,17 @@ fn a_light_carried_by_an_object_moves_with_it() {
         let mut free = ball(surface, ReflectionModel::Phong, &[]);
         free.spawn((lamp.clone(), alone));
         let (expected, _) = draw(&mut free, 64, 64, &linear());
-        // The place is multiplied together in f64 both times, in another order: some rounding to f32 may fall otherwise.
+        // The position is a product in f64 in both cases, in another order: some rounding to f32 may differ.
         assert!(apart(&moved, &expected) < 1e-5, "step {step}: {}", apart(&moved, &expected));
         assert!(largest(&moved) > 0.3, "step {step}: the lamp shines on the ball");
         assert!(frames.iter().all(|before| apart(before, &moved) > 0.05), "step {step}: it moved");
         frames.push(moved);
     }
-    // Let go of, it stays where it is in its own coordinates: beside the origin, inside the ball.
+    // Without its parent it stays where it is in its own coordinates: near the origin, inside the ball.
     world.entity_mut(carried).remove::<ChildOf>();
     let (dropped, _) = canvas.draw(&mut world, &linear());
     assert!(apart(&dropped, &frames[4]) > 0.05);
-    // Gone with the body that carries it.
+    // It is despawned with the body that carries it.
     world.entity_mut(carried).insert(ChildOf(body));
     world.despawn(body);
     let (dark, report) = canvas.draw(&mut world, &linear());

@@ -1,4 +1,5 @@
-//! Reflection models object by object, and the microfacet model in every distribution and Fresnel reflectance, against the f64 twin.
+//! Reflection models object by object, and the microfacet model with every distribution and Fresnel reflectance,
+//! compared with the f64 twin.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
@@ -13,8 +14,9 @@ use lumbre_tests::twin::{self, TwinOptions};
 use crate::adapter::{Canvas, draw, linear};
 
 const SIZE: usize = 192;
-/// As the ball's: f32 against f64. The Fresnel reflectance of a conductor adds some twenty roundings, of a Gaussian distribution forty.
-/// A matched Blinn exponent, 4 n n·l, is off by 80 times n·l's error where light grazes, with |ln n·h| about 1: 5·10⁻⁵.
+/// As in the ball tests, f32 compared with f64. The Fresnel reflectance of a conductor adds some twenty roundings,
+/// a Gaussian distribution forty. A matched Blinn exponent, 4 n n·l, is off by 80 times n·l's error at grazing
+/// light, with |ln n·h| about 1: 5·10⁻⁵.
 const LARGEST: f64 = 1e-4;
 const RELATIVE_L2: f64 = 1e-5;
 
@@ -70,7 +72,8 @@ fn every_distribution_and_fresnel_reflectance_agrees_with_the_twin() {
 #[test]
 fn every_model_in_every_shading_agrees_with_the_twin_side_by_side() {
     let (_, light) = every_light().swap_remove(2);
-    // Five objects, five models: nobody but the objects says which. Their polygons are large enough to have an inside.
+    // Five objects with five models, which only the objects define. Their polygons are large enough to have an
+    // interior.
     let mut world = ball_of(shapes::uv_sphere(1.0, 16, 9), light);
     let query = &mut world.query_filtered::<(Entity, &Mesh, &Material), Without<Camera>>();
     let (first, mesh, material) = query
@@ -120,17 +123,18 @@ fn every_model_in_every_shading_agrees_with_the_twin_side_by_side() {
                 model.name()
             );
         }
-        // Negative control: one ball's model at the others is seen.
+        // Negative control: using one ball's model for the others is detected.
         let wrong = TwinOptions { reflection: Some(ReflectionModel::BlinnMatched), ..TwinOptions::default() };
         let wrong = twin::draw(&mut world, width, height, wrong).inside_surfaces(*shading == Shading::Flat);
         assert!(compare(&got, &wrong).largest > 100.0 * LARGEST);
     }
 }
 
-/// A plane lit and, by a viewer infinitely far away, seen straight on: what is left of the model is its Fresnel reflectance.
+/// A plane lit and, by a viewer infinitely far away, seen along its normal, so that only the Fresnel reflectance of
+/// the model remains.
 fn straight_on(material: Material) -> DVec3 {
     let mut world = World::new();
-    // The plane's own normal is +Y: turned to the camera.
+    // The plane's own normal is +Y; it is rotated towards the camera.
     let turned = Transform {
         rotation: glam::DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2),
         ..Transform::default()
@@ -158,11 +162,11 @@ fn metallic_roughness_materials_reflect_what_gltf_says_at_normal_incidence() {
     for (name, material, expected) in
         [("plastic", plastic, DVec3::splat(0.04)), ("metal", metal, base.as_dvec3())]
     {
-        // The peak of the lobe is 1/(4 alpha^2) as high where it keeps its energy; as a bare one it is 1.
+        // The peak of the lobe is 1/(4 alpha^2) if it keeps its energy, and 1 for a bare lobe.
         let alpha = 0.3f64 * 0.3;
         for (lobe, peak) in [(Lobe::EnergyKeeping, 0.25 / (alpha * alpha)), (Lobe::Bare, 1.0)] {
             let got = straight_on(Material { lobe, ..material.clone() });
-            // Some tens of roundings in the Fresnel term, and f32's 0.04.
+            // Some tens of roundings in the Fresnel term, and that of 0.04 in f32.
             let apart = (got - peak * expected).abs().max_element();
             assert!(apart < 1e-5 * peak, "{name}, {}: {got} is not {}", lobe.name(), peak * expected);
         }
@@ -186,7 +190,7 @@ fn an_object_has_a_model_of_its_own_from_one_frame_to_the_next() {
         let expected = twin::draw(&mut world, SIZE, SIZE, TwinOptions::default()).inside_surfaces(false);
         let difference = compare(&own.iter().copied().map(Some).collect::<Vec<_>>(), &expected);
         assert!(difference.largest < LARGEST, "{}: {difference:?}", model.name());
-        // The caller decides last.
+        // The caller's option overrides all.
         let (forced, _) = canvas.draw(&mut world, &by_options(ReflectionModel::Phong));
         assert!(forced == scenes, "{}: the option does not override the object's own", model.name());
         assert!((own == scenes) == (*model == ReflectionModel::Phong), "{} has no effect", model.name());

@@ -1,5 +1,6 @@
-//! What is seen through glass in the frame, against the ray tree of the tracer: sheets to the bit of eight bits, bodies as far as the picture shows what lies behind them; and that a
-//! frame without glass in sight has none of it.
+//! Compares what is seen through glass in the frame with the tracer's ray tree: sheets up to a step of eight bits,
+//! solid bodies as far as the picture contains what is behind them. A frame without visible glass must contain
+//! nothing of this.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -17,7 +18,7 @@ use crate::adapter::{draw, linear};
 const WIDTH: u32 = 384;
 const HEIGHT: u32 = 288;
 
-/// A step of eight bits.
+/// One step of eight bits.
 const STEP: f64 = 1.0 / 255.0;
 
 fn matte(diffuse: Vec3) -> Material {
@@ -80,17 +81,17 @@ fn ball(world: &mut World, medium: Medium) {
     world.spawn((Mesh(Arc::new(shapes::uv_sphere(0.7, 96, 48))), glass(1.5), medium, place));
 }
 
-/// What a frame has of the glass in it.
+/// The comparison of the glass in a frame.
 #[derive(Debug)]
 struct Against {
-    /// Pixels in which anything is seen through glass.
+    /// Number of pixels in which anything is seen through glass.
     pixels: usize,
-    /// The mean difference of their channels from the ray tree: of the frame, and of one without refraction.
+    /// The mean difference of their channels from the ray tree, for the frame and for one without refraction.
     mean: f64,
     opaque: f64,
-    /// The part of these pixels in which the difference is less than 4/255.
+    /// The fraction of these pixels in which the difference is less than 4/255.
     close: f64,
-    /// The largest difference, of pixels over which the ray tree is even.
+    /// The largest difference over pixels in which the ray tree is even.
     largest: f64,
 }
 
@@ -144,13 +145,15 @@ fn a_sheet_shows_what_the_ray_tree_shows() {
         let options = FrameOptions { multisample: Some(samples), ..options() };
         let against = against_the_ray_tree(&mut world, &options, 1);
         println!("sheet, Fresnel {fresnel}, several samples {samples}, fog {fog}: {against:?}");
-        // Behind the sheet the tracer's fog counts metres along the ray, and the frame's along the line of sight.
+        // Behind the sheet the tracer's fog uses the length of the ray, and the frame's the distance along the line
+        // of sight.
         let most = if fog { 2.0 * STEP } else { STEP };
         assert!(against.pixels > 8000 && against.largest < most, "{against:?}");
     }
 }
 
-/// Bodies: what is seen through them is in the picture for most of their pixels, and there the ray tree's but for what is reflected inside.
+/// Solid bodies: for most of their pixels the picture contains what is seen through them, which there agrees with
+/// the ray tree except for internal reflections.
 #[test]
 fn a_ball_shows_nearly_what_the_ray_tree_shows() {
     let amber = Medium {
@@ -179,7 +182,7 @@ fn a_ball_shows_nearly_what_the_ray_tree_shows() {
     }
 }
 
-/// Water in a basin: a plane without a back, through which the bottom is nearer than it is.
+/// Water in a basin: a plane without a back, through which the bottom appears nearer than it is.
 #[test]
 fn a_pool_shows_nearly_what_the_ray_tree_shows() {
     let mut world = room();

@@ -1,4 +1,5 @@
-//! Frames that are shaded deferred against the same frames shaded forward: the same to rounding, whatever is in them, and in whatever order it is drawn.
+//! Compares frames with deferred shading with the same frames in forward shading: the same up to rounding, for any
+//! contents and order of drawing.
 
 use std::sync::Arc;
 
@@ -20,10 +21,11 @@ use lumbre_tests::panes::{image, sharp};
 
 use crate::adapter::{Canvas, draw, gpu, linear};
 
-/// The largest difference of a pixel that is let pass, relative to its brightest channel and a hundredth: a point is found from its pixel and its depth, and a normal is stored
-/// on the octahedron, instead of being interpolated, which rounds too. A step of eight bits is 4e-3.
+/// The largest accepted difference of a pixel, relative to its brightest channel plus a hundredth. A point is
+/// reconstructed from its pixel and depth, and a normal is stored in octahedral encoding, which rounds in other
+/// ways than interpolation does. A step of eight bits is 4e-3.
 const ROUNDING: f64 = 6e-5;
-/// Where textures or vertex colours modulate light: they are stored to 2^-13 of what they are.
+/// The same where textures or vertex colours modulate light: they are stored with a relative error of 2^-13.
 const TINTED: f64 = 1.22e-4 + ROUNDING;
 
 const SIZE: (u32, u32) = (131, 83);
@@ -38,7 +40,7 @@ fn largest_difference(expected: &[DVec3], got: &[DVec3]) -> f64 {
     expected.iter().zip(got).map(of).fold(0.0, f64::max)
 }
 
-/// The difference of both paths, and what the deferred frame reports.
+/// Returns the difference of both paths, and the report of the deferred frame.
 fn difference(world: &mut World, options: &FrameOptions) -> (f64, FrameReport) {
     let with = |rendering_path| FrameOptions { rendering_path, ..options.clone() };
     let (expected, forward) = draw(world, SIZE.0, SIZE.1, &with(RenderingPath::Forward));
@@ -48,7 +50,7 @@ fn difference(world: &mut World, options: &FrameOptions) -> (f64, FrameReport) {
     (largest_difference(&expected, &got), deferred)
 }
 
-/// A shiny surface of a colour.
+/// A shiny material of a colour.
 fn shiny(red: f32, green: f32, blue: f32) -> Material {
     let front = Surface {
         ambient: Vec3::splat(0.2),
@@ -128,7 +130,8 @@ fn any_camera_and_any_lists_show_the_same() {
 
 #[test]
 fn what_the_g_buffer_has_no_room_for_is_drawn_with_the_rest() {
-    // In front of deferred surfaces and behind them, with and without lightmaps, so that neither pass may paint over the other.
+    // In front of deferred surfaces and behind them, with and without lightmaps, so that neither pass may draw over
+    // the other.
     let mut world = room(perspective());
     let mesh = |mesh: TriangleMesh| Mesh::from(mesh);
     let at = |x: f64, y: f64, z: f64| Transform::from_xyz(x, y, z).with_scale(DVec3::splat(0.7));
@@ -160,7 +163,7 @@ fn what_the_g_buffer_has_no_room_for_is_drawn_with_the_rest() {
 fn baked_light_shadows_fog_and_backs_are_the_same() {
     let mut world = room(perspective());
     let open = {
-        // A ball without its upper half, which shows its inside.
+        // A ball without its upper half, whose inside is visible.
         let mut mesh = ball();
         mesh.indices.truncate(mesh.indices.len() / 2);
         mesh
@@ -200,7 +203,7 @@ fn baked_light_shadows_fog_and_backs_are_the_same() {
     println!("{apart:.1e}");
     assert!(apart < ROUNDING, "{apart}");
     assert!(report.plan.status("shadow maps").unwrap().runs());
-    // Nothing of this frame had to be drawn forward.
+    // Nothing in this frame had to be drawn forward.
     assert_eq!(report.statistics.lit_passes, Default::default());
     let measured = FrameOptions { measure: Measure::Time, ..by(RenderingPath::Deferred) };
     let (_, deferred) = draw(&mut world, SIZE.0, SIZE.1, &measured);
@@ -232,7 +235,7 @@ fn textures_and_vertex_colors_modulate_the_same_light() {
     world.spawn((Mesh::from(ball()), shiny(1.0, 1.0, 1.0), textures(0), at(-3.0)));
     world.spawn((Mesh::from(lightmapped(ball())), shiny(1.0, 1.0, 1.0), textures(1), at(-1.2)));
     world.spawn((Mesh::from(colored.clone()), shiny(1.0, 1.0, 1.0), at(0.6)));
-    // Brighter than white.
+    // Vertex colours brighter than white.
     colored.colors.iter_mut().for_each(|color| *color *= Vec4::new(3.0, 2.0, 4.0, 1.0));
     let both = (Mesh::from(lightmapped(colored)), shiny(1.0, 1.0, 1.0), textures(0), lightmap(Vec3::ONE));
     world.spawn((both, at(2.4)));
@@ -241,7 +244,7 @@ fn textures_and_vertex_colors_modulate_the_same_light() {
     assert!(apart < TINTED, "{apart}");
 }
 
-/// What hides everything behind the middle of what a parallel camera sees.
+/// An effect that hides everything behind the middle of the depth range of an orthographic camera.
 struct Curtain;
 
 impl Effect for Curtain {
@@ -283,7 +286,8 @@ fn what_a_program_draws_behind_everything_hides_the_same() {
 #[test]
 fn of_coplanar_surfaces_the_same_is_seen() {
     let mut world = room(perspective());
-    // Nearer to the eye than the wall's farthest corner, and in its plane; and the same mesh twice, the older one without a lightmap.
+    // A wall coplanar with a larger one, and nearer to the eye than that one's farthest corner; and the same mesh
+    // twice, the older one without a lightmap.
     let wall =
         |y: f64, z: f64| Transform::from_xyz(0.0, y, z).looking_at(DVec3::new(0.0, -90.0, z), DVec3::Z);
     let (large, small) = (shapes::plane(8.0, 4.0, 1, 1), shapes::plane(1.0, 1.0, 1, 1));
@@ -314,7 +318,7 @@ fn more_lightmaps_than_classes_are_all_shown() {
 
 #[test]
 fn a_light_that_is_left_out_is_missed() {
-    // Negative control: what deferred shading leaves out shows.
+    // Negative control: a light that is missing in the deferred frame is detected.
     let mut world = room(perspective());
     let (expected, _) = draw(&mut world, SIZE.0, SIZE.1, &by(RenderingPath::Forward));
     let lamps: Vec<Entity> = world.query_filtered::<Entity, With<Light>>().iter(&world).collect();
@@ -340,12 +344,12 @@ fn automatic_is_deferred_where_software_draws_many_lights() {
     assert!(!runs(&mut world, &FrameOptions { multisample: Some(true), ..auto.clone() }));
     assert!(!runs(&mut world, &FrameOptions { shading: Some(Shading::Gouraud), ..auto.clone() }));
     assert!(!runs(&mut world, &FrameOptions { specular_antialiasing: Some(true), ..auto.clone() }));
-    // Triangles that are large in the frame fill what is shaded for them.
+    // With triangles that are large in the frame, forward shading wastes little.
     assert!(!draw(&mut world, 640, 480, &auto).1.plan.status("g-buffer").unwrap().runs());
-    // Whatever is asked: of several samples in a pixel the G-buffer would hold one.
+    // Even on request: of several samples per pixel the G-buffer would hold only one.
     let several = FrameOptions { multisample: Some(true), ..by(RenderingPath::Deferred) };
     assert!(!runs(&mut world, &several));
-    // The plan without a frame says the same as the frame's.
+    // The plan without a frame agrees with that of the frame.
     let explained = Renderer::new(gpu()).explain(&mut world, &auto, 40, 30).unwrap();
     let pass = explained.frame.passes.iter().find(|pass| pass.name == "g-buffer").unwrap();
     assert_eq!(pass.group.is_some(), gpu().is_software());
@@ -353,7 +357,7 @@ fn automatic_is_deferred_where_software_draws_many_lights() {
     assert_eq!(path(explained).starts_with("deferred"), gpu().is_software());
     let without_a_device = lumbre_render::explain(&mut world, &auto, 40, 30).unwrap();
     assert!(path(without_a_device).contains("deferred where a processor draws"));
-    // With fewer lights it is not worth a G-buffer.
+    // With fewer lights a G-buffer is not worthwhile.
     lamps.into_iter().for_each(|lamp| assert!(world.despawn(lamp)));
     assert!(!runs(&mut world, &auto));
 }
@@ -385,7 +389,7 @@ fn a_part_of_a_target_and_what_mirrors_show_are_the_same() {
         println!("{viewport:?}: {apart:?} of 255");
         assert!(apart <= Some(1), "{viewport:?}: {apart:?}");
     }
-    // A renderer that was built without the G-buffer lights every surface where it is drawn.
+    // A renderer without the G-buffer lights every surface where it is drawn.
     let frame = Offscreen::new(gpu(), 48, 32, OffscreenFormat::Rgba8).unwrap();
     let mut without = Renderer::builder().without(BuiltIn::GBuffer).build(gpu());
     let asked = FrameOptions { rendering_path: RenderingPath::Deferred, ..FrameOptions::default() };

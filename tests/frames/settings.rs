@@ -1,4 +1,5 @@
-//! Choices of a scene, of an object and of a frame: fog, the viewer, mixed techniques, and options that change while it runs.
+//! Settings of a scene, of an object and of a frame: fog, the viewer, mixed techniques, and options that change
+//! between frames.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
@@ -14,7 +15,7 @@ use crate::adapter::{Canvas, draw, linear};
 
 const SIZE: usize = 112;
 
-/// f32 against f64, as balls.rs has it.
+/// f32 compared with f64, as in balls.rs.
 const LARGEST: f64 = 1e-4;
 
 fn lamp() -> Light {
@@ -50,7 +51,7 @@ fn the_four_fogs_agree_with_the_twin() {
         frames.push(draw(&mut world, SIZE as u32, SIZE as u32, &linear()).0);
     }
     frames.push(draw(&mut ball(lamp()), SIZE as u32, SIZE as u32, &linear()).0);
-    // Negative control: four fogs and none are five pictures.
+    // Negative control: four fogs and no fog are five different pictures.
     for a in 0..frames.len() {
         for b in 0..a {
             let largest = frames[a]
@@ -77,7 +78,7 @@ fn a_viewer_infinitely_far_away_agrees_with_the_twin() {
     assert!(largest > 100.0 * LARGEST, "negative control: the highlight moves");
 }
 
-/// Three coarse balls beside each other, one of each technique, whatever the scene says.
+/// Three coarse balls side by side, one of each technique, regardless of the scene's setting.
 fn three_techniques() -> World {
     let mut world = ball_of(shapes::uv_sphere(1.0, 12, 6), lamp());
     let first = world.query_filtered::<Entity, With<Mesh>>().single(&world).unwrap();
@@ -93,7 +94,7 @@ fn three_techniques() -> World {
 
 #[test]
 fn three_techniques_in_one_frame() {
-    // Large enough that triangles have an inside, the only place where flat shading can be compared.
+    // Large enough for triangles to have an interior, the only place where flat shading can be compared.
     const SIZE: usize = 200;
     let mut world = three_techniques();
     let frame = twin::draw(&mut world, SIZE, SIZE, TwinOptions::default());
@@ -112,7 +113,7 @@ fn three_techniques_in_one_frame() {
         assert!(difference.pixels > 500, "ball {ball}: {} pixels", difference.pixels);
         assert!(difference.largest < LARGEST, "ball {ball}: {difference:?}");
     }
-    // Negative control: a frame's own technique overrides all three, and two balls look otherwise then.
+    // Negative control: a frame's own technique overrides all three, which changes two of the balls.
     for shading in Shading::ALL {
         let options = FrameOptions { shading: Some(*shading), ..options.clone() };
         let forced = some(draw(&mut world, SIZE as u32, SIZE as u32, &options).0);
@@ -121,7 +122,7 @@ fn three_techniques_in_one_frame() {
     }
 }
 
-/// The three balls over a lightmapped floor that a static lamp lights as well.
+/// The three balls over a lightmapped floor that a static lamp also lights.
 fn lightmapped() -> World {
     let mut world = three_techniques();
     let mut floor = shapes::plane(6.0, 6.0, 4, 4);
@@ -176,7 +177,7 @@ fn options_that_change_from_frame_to_frame_leave_nothing_behind() {
         seen.push(kept);
     }
     assert_eq!(seen[4], seen[11], "the same options give the same frame");
-    // Negative control: all others are pictures of their own, but for the scene's own options.
+    // Negative control: all others are different pictures, except the one with the scene's own options.
     for a in 0..11 {
         for b in 0..a {
             assert!(seen[a] != seen[b], "frames {a} and {b} are equal");
@@ -240,7 +241,7 @@ fn the_sky_is_the_background_and_lights_what_has_no_lightmap() {
     };
     let none = SceneSettings::default();
     let under_sky = frame(SceneSettings { sky, ..none }, false);
-    // A sky of radiance L gives k_a what ambient light of L gives; the corner of the frame sees past the ball.
+    // A sky of radiance L has the effect on k_a of ambient light of L; the corner of the frame is beside the ball.
     let in_ambient_light = frame(SceneSettings { ambient: sky, background: sky, ..none }, false);
     assert_eq!(under_sky, in_ambient_light);
     assert_eq!(under_sky[0], sky.as_dvec3());
@@ -248,7 +249,7 @@ fn the_sky_is_the_background_and_lights_what_has_no_lightmap() {
         under_sky.iter().any(|pixel| (*pixel - sky.as_dvec3()).abs().max_element() > 0.05),
         "the ball is seen"
     );
-    // A background that is stated stays; a lightmap has the sky's light already.
+    // An explicit background is kept; a lightmap already contains the sky's light.
     let background = Vec3::new(0.0, 0.0, 0.125);
     let baked = frame(SceneSettings { sky, background, ..none }, true);
     assert_eq!(baked[0], background.as_dvec3());

@@ -1,5 +1,6 @@
-//! Shading by need against Phong shading: no pixel is farther from it than what was asked for, nor than what was predicted, and objects are shaded less often where that
-//! allows it. On spheres of eight depths under lights and exponents of many kinds, the scanned bunny, the teapot, and the level from all its cameras.
+//! Compares shading by need with Phong shading: no pixel differs by more than the requested error, nor by more than
+//! predicted, and objects are shaded less often where the error allows. On spheres of eight subdivision depths
+//! under many kinds of lights and exponents, the scanned bunny, the teapot, and the level from all its cameras.
 
 use std::sync::Arc;
 
@@ -15,30 +16,31 @@ use lumbre_tests::shared_files::shared_file;
 
 use crate::adapter::{Canvas, linear};
 
-/// What is asked for, from what a teacher would notice to less than an eight-bit code.
+/// The requested errors, from clearly visible ones to less than an eight-bit code.
 const BOUNDS: [f32; 4] = [0.1, 0.03, 0.01, 0.003];
-/// f32's, of sums over lights of which the brightest pixel has a radiance of some 5 (balls.rs: 1.4e-5 at a radiance of 1).
+/// Error of f32, for sums over lights whose brightest pixel has a radiance of some 5 (balls.rs: 1.4e-5 at a
+/// radiance of 1).
 const ROUNDING: f64 = 1e-4;
 
 fn auto(max_error: f32) -> Shading {
     Shading::Auto { max_error: ErrorBound::new(max_error).unwrap() }
 }
 
-/// What one frame by need was.
+/// The result of one frame with shading by need.
 #[derive(Clone, Copy, Debug)]
 struct ByNeed {
     needs: ShadingNeeds,
-    /// The largest difference of a pixel and channel from Phong shading.
+    /// The largest difference of any pixel and channel from Phong shading.
     error: f64,
 }
 
-/// A scene from one camera: by need at each bound, and the errors of flat and Gouraud shading throughout.
+/// A scene from one camera: by need with each bound, and the errors of flat and Gouraud shading for all objects.
 struct Compared {
     by_need: [ByNeed; BOUNDS.len()],
     without: [f64; 2],
 }
 
-/// Draws a scene at all bounds with one renderer, so that what it keeps of predictions is under test too, and compares.
+/// Draws a scene with all bounds and one renderer, so that its kept predictions are tested too, and compares.
 #[allow(clippy::print_stdout, reason = "what is predicted, beside what is so")]
 fn compared(name: &str, world: &mut World, (width, height): (u32, u32), options: &FrameOptions) -> Compared {
     let mut canvas = Canvas::new(width, height);
@@ -72,7 +74,7 @@ fn compared(name: &str, world: &mut World, (width, height): (u32, u32), options:
     Compared { by_need, without }
 }
 
-/// A light of one kind over the spheres.
+/// Adds lights of one kind over the spheres.
 fn lights(kind: &str, world: &mut World) {
     let white = Vec3::splat(1.0);
     let toward = |from: [f64; 3]| Transform::from_translation(from.into()).looking_at(DVec3::ZERO, DVec3::Y);
@@ -117,7 +119,7 @@ fn lights(kind: &str, world: &mut World) {
 const KINDS: [&str; 6] =
     ["sun", "dim sun", "points", "spots", "sun that casts shadows", "sun and a near lamp"];
 
-/// Spheres of depths 0 to 7 in two rows; with a highlight of this exponent, or matt ones.
+/// Spheres of depths 0 to 7 in two rows, with a highlight of this exponent, or matt.
 fn spheres(kind: &str, shininess: Option<f32>, lobe: Lobe, model: ReflectionModel) -> World {
     let mut world = World::new();
     for depth in 0..8 {
@@ -150,13 +152,13 @@ fn spheres_of_eight_depths_are_no_farther_from_phong_than_is_asked() {
     let mut all = Vec::new();
     for (kind_number, kind) in KINDS.into_iter().enumerate() {
         for (number, (shininess, lobe, model)) in materials.into_iter().enumerate() {
-            // Half of them, and all matt ones.
+            // Half of the combinations, and all matt ones.
             if number > 0 && (kind_number + number) % 2 == 0 {
                 continue;
             }
             let name = format!("{kind}, {} {}", model.name(), shininess.unwrap_or(0.0));
             let mut world = spheres(kind, shininess, lobe, model);
-            // The finest has 32,770 vertices: it takes many pixels that shading them less often is cheaper.
+            // The finest sphere has 32,770 vertices, so shading it less often is only cheaper with many pixels.
             let size = if number < 2 { (1280, 640) } else { (640, 320) };
             all.push(compared(&name, &mut world, size, &linear()));
         }
@@ -167,19 +169,20 @@ fn spheres_of_eight_depths_are_no_farther_from_phong_than_is_asked() {
     for (number, bound) in BOUNDS.into_iter().enumerate() {
         let (cheaper, phong) = (count(number, |it| it.flat + it.gouraud), count(number, |it| it.phong));
         println!("{bound}: {cheaper} of {} spheres are not shaded at every fragment", cheaper + phong);
-        // Were every prediction 0, all would be off by what Gouraud shading is, which is more; were it infinite, all would be Phong.
+        // If every prediction were 0, the error would be that of Gouraud shading, which is larger; if it were
+        // infinite, all spheres would have Phong shading.
         assert!(
             all.iter().filter(|one| one.without[1] > f64::from(bound) + ROUNDING).count() > all.len() / 2
         );
         assert!(cheaper > 0 && phong > cheaper / 8, "{bound}: {cheaper} and {phong}");
-        // Predictions would be no use that are far beyond all errors: some come within four times.
+        // Predictions far above all errors would be useless: some are within a factor of four.
         let near = all.iter().map(|one| one.by_need[number]).filter(|one| one.needs.predicted_error > 0.0);
         let near = near.filter(|one| one.error > 0.25 * one.needs.predicted_error).count();
         assert!(near > 0, "{bound}: no prediction is near");
     }
 }
 
-/// Where every triangle has its own vertices, flat shading costs no more than Gouraud shading.
+/// If every triangle has its own vertices, flat shading costs no more than Gouraud shading.
 #[test]
 fn facets_in_the_sun_are_shaded_flat() {
     let mut world = spheres("sun", None, Lobe::Bare, ReflectionModel::Phong);
@@ -248,7 +251,7 @@ fn the_levels_tour_is_no_farther_from_phong_than_is_asked() {
 #[test]
 fn what_explain_names_is_what_the_frame_takes() {
     let mut world = spheres("sun", Some(4.0), Lobe::Bare, ReflectionModel::Phong);
-    // One of them asks for it by itself.
+    // One sphere has its own shading.
     let first = world.query_filtered::<Entity, With<Mesh>>().iter(&world).next().unwrap();
     world.entity_mut(first).insert(Shading::Flat);
     world.resource_mut::<SceneSettings>().shading = auto(0.1);
@@ -266,7 +269,7 @@ fn what_explain_names_is_what_the_frame_takes() {
     assert!(named("SHADING_GOURAUD") && named("SHADING_PHONG"), "{:?}", explained.variants);
 }
 
-/// Predictions are kept, and made anew when what they follow from changes.
+/// Predictions are kept, and updated when their inputs change.
 #[test]
 fn what_moves_is_predicted_anew() {
     let mut world = spheres("points", Some(4.0), Lobe::Bare, ReflectionModel::Phong);

@@ -1,5 +1,6 @@
-//! Shadow maps against shadow rays in f64: a ball and a box over a floor, under every kind of light; what is flat never shadows itself, what stands on the floor has its
-//! shadow at its feet, and what did not change is not drawn again.
+//! Compares shadow maps with shadow rays in f64: a ball and a box over a floor, under every kind of light. A flat
+//! surface never shadows itself, an object on the floor has a shadow that touches it, and unchanged maps are not
+//! drawn again.
 
 use std::sync::Arc;
 
@@ -14,12 +15,12 @@ use lumbre_scene::{Camera, Mesh, Projection, Transform};
 use crate::adapter::gpu;
 
 const SIZE: u32 = 256;
-/// Half the side of the floor that is seen, in metres.
+/// Half the side of the visible floor, in metres.
 const HALF: f64 = 3.0;
 const BALL: DVec3 = DVec3::new(0.0, 1.0, 0.0);
 const RADIUS: f64 = 0.5;
 
-/// A floor seen straight from above.
+/// A floor seen from straight above.
 fn floor() -> World {
     let mut world = World::new();
     world.spawn((Mesh::from(shapes::plane(20.0, 20.0, 4, 4)), Material::matt(Vec3::splat(0.8))));
@@ -34,7 +35,7 @@ fn light(world: &mut World, light: Light, place: DVec3, target: DVec3) -> Entity
     world.spawn((Light { shadow: true, ..light }, transform)).id()
 }
 
-/// The point of the floor in the middle of a pixel.
+/// Returns the point of the floor at the centre of a pixel.
 fn point(index: usize) -> DVec3 {
     let along = |pixel: usize| (pixel as f64 + 0.5) / f64::from(SIZE) * 2.0 - 1.0;
     let (x, y) = (index % SIZE as usize, index / SIZE as usize);
@@ -42,7 +43,7 @@ fn point(index: usize) -> DVec3 {
 }
 
 struct Drawn {
-    /// Radiance of red with shadows over that without, by pixel; 1 where it is dark without.
+    /// For each pixel the red radiance with shadows over that without; 1 where it is dark without.
     lit: Vec<f64>,
     report: FrameReport,
 }
@@ -68,7 +69,7 @@ fn draw(renderer: &mut Renderer, world: &mut World, shading: Shading) -> Drawn {
     Drawn { lit: with.iter().zip(&without).map(part).collect(), report }
 }
 
-/// How far a ray from the floor to the light passes from the middle of the ball, if it passes it at all.
+/// Returns the distance at which a ray from the floor to the light passes the centre of the ball.
 fn passes(point: DVec3, toward: DVec3, end: f64) -> f64 {
     let along = (BALL - point).dot(toward).clamp(0.0, end);
     (point + toward * along).distance(BALL)
@@ -100,14 +101,14 @@ fn shadows_fall_where_rays_say() {
         let (mut dark, mut bright, mut near) = (0, 0, 0);
         for (index, lit) in lit.iter().enumerate() {
             let point = point(index);
-            // The ball hides the floor there, and is lit itself.
+            // The ball covers the floor there, and is lit itself.
             if DVec3::new(point.x, BALL.y, point.z).distance(BALL) < RADIUS + 0.03 {
                 continue;
             }
             let toward = if distant { place } else { place - point };
             let end = if distant { f64::INFINITY } else { toward.length() };
             let passed = passes(point, toward.normalize(), end);
-            // Three texels of the maps, at most.
+            // At most three texels of the maps.
             if (passed - RADIUS).abs() < 0.1 {
                 near += 1;
                 assert!((0.0..=1.0 + 1e-6).contains(lit), "{name}: {lit} at {point}");
@@ -152,7 +153,7 @@ fn a_flat_floor_never_shadows_itself_and_a_box_has_its_shadow_at_its_feet() {
                 let worst = lit.iter().fold(1.0, |worst: f64, lit| worst.min(*lit));
                 assert!(worst > 0.999, "{name} at {elevation} degrees: {worst} of the light");
             }
-            // A box of half a metre stands on the floor.
+            // A box of half a metre on the floor.
             world.spawn((
                 Mesh::from(shapes::cuboid(Vec3::splat(0.5), 1)),
                 Material::matt(Vec3::ONE),
@@ -170,7 +171,8 @@ fn a_flat_floor_never_shadows_itself_and_a_box_has_its_shadow_at_its_feet() {
             if elevation < 71.0 {
                 let length = 0.5 * cosine / sine;
                 let touching = shadow(0.06);
-                // A map of a near light has texels of a tenth of a metre there, which at two degrees hold what is before the box too.
+                // The map of a near light has texels of a tenth of a metre there, which at two degrees also contain
+                // what is in front of the box.
                 assert!(
                     touching < 0.02 || !distant && elevation < 10.0,
                     "{name} at {elevation} degrees: {touching} of the light at the box's feet"
@@ -203,7 +205,7 @@ fn a_large_light_has_a_penumbra_that_grows_with_distance() {
             ..Light::spot(Vec3::splat(30.0), SpotCone::Smooth { inner: 0.6, outer: 0.8 })
         };
         light(&mut world, lamp, DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO);
-        // From below the sheet: the floor is seen through where the camera is under it.
+        // Seen from below the sheet, so that the covered floor is visible.
         let mut cameras = world.query::<(&mut Transform, &Camera)>();
         for (mut transform, _) in cameras.iter_mut(&mut world) {
             transform.translation.y = 0.5 * height;
@@ -213,7 +215,8 @@ fn a_large_light_has_a_penumbra_that_grows_with_distance() {
         assert!(row[20] < 0.01 && row[236] > 0.99, "dark under the sheet, light beside it");
         row.iter().filter(|lit| (0.05..0.95).contains(*lit)).count() as f64 / f64::from(SIZE) * 2.0 * HALF
     });
-    // Width of the penumbra of a ball of light: 2 r h / (H - h), of which the filter shows some nine tenths; a texel more or less.
+    // The width of the penumbra of a spherical light is 2 r h / (H - h), of which the filter shows some nine
+    // tenths, with a tolerance of a texel.
     for (width, height) in widths.iter().zip([0.3, 1.5]) {
         let expected = 2.0 * 0.25 * height / (4.0 - height);
         assert!(
@@ -247,13 +250,13 @@ fn what_did_not_change_is_not_drawn_again() {
     assert!(drawn && moved != first);
     world.get_mut::<Transform>(lamp).unwrap().translation.x -= 1.0;
     assert!(frame(&mut world).1);
-    // Another renderer draws the same from nothing.
+    // A new renderer draws the same.
     let fresh = Renderer::new(gpu()).render(&mut world, &target.target(), &options);
     assert!(fresh.is_ok());
     let fresh = target.read_linear(gpu()).unwrap();
     let (kept, drawn) = frame(&mut world);
     assert!(!drawn && kept == fresh);
-    // A light that asks for none, and a frame that wants none.
+    // A light without a shadow, which also changes the frame.
     world.get_mut::<Light>(lamp).unwrap().shadow = false;
     let (plain, drawn) = frame(&mut world);
     assert!(!drawn && plain != kept);
@@ -271,7 +274,7 @@ fn lights_without_room_are_named() {
         );
     }
     let Drawn { lit, report } = draw(&mut Renderer::new(gpu()), &mut world, Shading::Phong);
-    // 128 views: 21 point lights of six.
+    // 128 views are enough for 21 point lights with six views each.
     assert_eq!(report.left_out.len(), 9, "{:?}", report.left_out);
     assert!(report.left_out[0].contains("128 views"), "{}", report.left_out[0]);
     assert!(lit.iter().all(|lit| (lit - 1.0).abs() < 1e-5));
@@ -286,13 +289,13 @@ fn a_lamp_does_not_shadow_its_own_light() {
     let Drawn { lit, .. } = draw(&mut Renderer::new(gpu()), &mut world, Shading::Phong);
     let bright = |lit: &[f64]| lit.iter().filter(|lit| (**lit - 1.0).abs() < 1e-6).count();
     assert_eq!(bright(&lit), lit.len());
-    // The same bulb as an object of its own around the light.
+    // The same bulb as a separate object around the light.
     let bulb = world.entity_mut(lamp).take::<Mesh>().unwrap();
     let place = Transform::from_xyz(0.0, 3.0, 0.0);
     let glowing = world.spawn((bulb, Material::emissive(Vec3::ONE), place)).id();
     let Drawn { lit, .. } = draw(&mut Renderer::new(gpu()), &mut world, Shading::Phong);
     assert_eq!(bright(&lit), lit.len());
-    // One that does not glow hides it.
+    // A bulb that does not glow hides the light.
     world.entity_mut(glowing).insert(Material::matt(Vec3::ONE));
     let Drawn { lit, .. } = draw(&mut Renderer::new(gpu()), &mut world, Shading::Phong);
     assert!(bright(&lit) < lit.len() / 10, "{}", bright(&lit));

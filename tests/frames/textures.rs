@@ -1,4 +1,5 @@
-//! Textures: each texel lands where its coordinates say, decoded as its slot says, and modulates what it should and nothing else.
+//! Textures: each texel appears where its coordinates say, decoded as its slot requires, and modulates only what it
+//! should.
 
 use std::sync::Arc;
 
@@ -22,13 +23,13 @@ use crate::adapter::{draw, linear};
 
 pub(crate) const SIZE: usize = 32;
 
-/// Of a decoded sRGB texel: decoding may be off by half an eight-bit code (the Direct3D functional specification's bound, which drivers
-/// keep), and the curve is steepest at white, 2.275: 0.5/255*2.275.
+/// Error of a decoded sRGB texel: decoding may be off by half an eight-bit code (the bound of the Direct3D
+/// functional specification, which drivers keep), and the curve is steepest at white, 2.275: 0.5/255*2.275.
 const DECODED: f64 = 4.5e-3;
-/// Of a colour of eight linear bits: f32 roundings of one product or two of numbers up to 1.
+/// Error of a colour of eight linear bits: f32 roundings of one or two products of numbers up to 1.
 const EXACT: f64 = 5e-7;
 
-/// Sixteen colours, no two of them near each other, no row or column like another.
+/// Sixteen colours, no two of them similar, with all rows and columns different.
 fn palette() -> Vec<[u8; 4]> {
     (0..16_u8).map(|i| [i * 17, 255 - (i % 4) * 80, (i / 4) * 80, 255]).collect()
 }
@@ -38,8 +39,8 @@ fn nearest(texels: &[[u8; 4]], width: usize, uv: DVec2) -> [u8; 4] {
     texels[at.y as usize * width + at.x as usize]
 }
 
-/// Whether a coordinate is so near an edge between texels that f32 may fall on the other side of it: 1e-4 of a texel is hundreds of
-/// roundings.
+/// Returns true if a coordinate is so near an edge between texels that f32 may be on the other side of it: 1e-4 of
+/// a texel is hundreds of roundings.
 fn on_an_edge(uv: DVec2, width: usize, height: usize) -> bool {
     let at = uv * DVec2::new(width as f64, height as f64);
     (at - at.round()).abs().min_element() < 1e-4
@@ -56,7 +57,7 @@ fn base_color(texture: TextureReference) -> MaterialTextures {
     MaterialTextures { base_color: Some(texture), ..MaterialTextures::default() }
 }
 
-/// A frame of [`SIZE`] pixels a side against what each pixel is to show.
+/// Compares a frame with a side of [`SIZE`] pixels with what each pixel should show.
 pub(crate) fn difference(
     world: &mut World,
     options: &FrameOptions,
@@ -81,7 +82,7 @@ fn texels_land_where_their_coordinates_say() {
         let expected = |x, y| Some(srgb_texel(nearest(&texels, 4, pixel_uv(x, y, SIZE))));
         let right = difference(&mut world, &linear(), expected);
         assert!(right.largest < DECODED, "{right:?}");
-        // Negative control: upside down, or not decoded, is told apart.
+        // Negative control: upside down or without decoding it is detected.
         let flipped = |x, y: usize| Some(srgb_texel(nearest(&texels, 4, pixel_uv(x, SIZE - 1 - y, SIZE))));
         assert!(difference(&mut world, &linear(), flipped).largest > 0.1);
         let raw = |x, y| {
@@ -104,7 +105,8 @@ fn coordinates_are_scaled_then_rotated_then_moved() {
     ] {
         let texture = TextureReference { offset, rotation, scale, ..plain.clone() };
         let mut world = textured(base_color(texture), Material::matt(Vec3::ONE));
-        // KHR_texture_transform: translation * rotation * scale, rotation counter-clockwise on the screen, where v runs down.
+        // KHR_texture_transform: translation * rotation * scale, with the rotation counter-clockwise on the screen,
+        // where v increases downwards.
         let expected = |rotation: f64| {
             let texels = &texels;
             move |x, y| {
@@ -182,14 +184,14 @@ fn an_emissive_texture_shows_whatever_the_light_and_the_shading() {
     }
 }
 
-/// A lamp over the pane, near enough for a highlight whose edge is inside it.
+/// A lamp over the pane, near enough for the edge of its highlight to be inside the pane.
 fn lamp() -> (Light, Transform) {
     (Light::point(Vec3::splat(3.0)), Transform::from_xyz(0.3, -0.2, 1.5))
 }
 
 #[test]
 fn a_metallic_roughness_texture_is_the_material_of_each_texel() {
-    // Red is not read; green is roughness, blue metallic; both linear.
+    // Red is not used; green is roughness and blue metalness, both linear.
     let texels = [[255, 128, 0, 255], [0, 255, 255, 255], [9, 60, 128, 255], [77, 200, 51, 255]];
     let base = Vec3::new(0.9, 0.5, 0.2);
     let (metallic, roughness) = (0.8, 0.9);
@@ -223,11 +225,12 @@ fn a_metallic_roughness_texture_is_the_material_of_each_texel() {
             Some(shade(ReflectionModel::Phong, surface, DVec3::ONE, [sample], DVec3::Z, viewer).total())
         };
         let found = difference(&mut world, &linear(), expected);
-        // f32 throughout: the exponent, up to 1600 here, times the roundings of the cosine's logarithm. With the base colour texture its
-        // decoding, times the light: 1 of ambient light, 3/1.5^2 of diffuse, 3/1.5^2 of specular light.
+        // f32 throughout: the exponent, up to 1600 here, times the roundings of the cosine's logarithm. With the
+        // base colour texture it is its decoding error times the light: 1 of ambient light, 3/1.5^2 of diffuse,
+        // 3/1.5^2 of specular light.
         let bound = if with_base { DECODED * (1.0 + 2.0 * 3.0 / 2.25) } else { 1e-4 };
         assert!(found.largest < bound, "with base: {with_base}: {found:?}");
-        // Negative control: the factors alone, as if there were no texture, are far off.
+        // Negative control: the factors alone, without the texture, differ a lot.
         let plain = |x, y| {
             let point = pixel_point(x, y, SIZE);
             let material = Material::from_metallic_roughness(base, metallic, roughness);
@@ -256,7 +259,7 @@ fn textures_modulate_ambient_and_diffuse_light_and_not_highlights() {
                 base_color(sharp(&image(1, &[[code, code, code, 255]])))
             });
             let mut world = textured(textures, Material { front, ..Material::default() });
-            // Vertices enough for Gouraud's shading to show a highlight.
+            // Enough vertices for Gouraud shading to show a highlight.
             let entity = world.query_filtered::<Entity, With<Mesh>>().single(&world).unwrap();
             let upright = Transform::from_rotation(glam::DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2));
             world.entity_mut(entity).insert((Mesh(Arc::new(shapes::plane(2.0, 2.0, 8, 8))), upright));
@@ -279,7 +282,8 @@ fn textures_modulate_ambient_and_diffuse_light_and_not_highlights() {
             let mixed = highlight[at] + srgb(188) * (plain[at] - highlight[at]);
             assert!(near(grey[at], mixed, DECODED * 2.0), "{}: {} {mixed}", shading.name(), grey[at]);
         }
-        // Negative control: a highlight that were modulated too would go with the black texture, and half of it with the grey one.
+        // Negative control: if it were modulated too, the highlight would disappear with the black texture, and be
+        // halved with the grey one.
         let brightest = highlight.iter().map(|pixel| pixel.x - 0.05).fold(0.0, f64::max);
         assert!(brightest > 0.2, "{}: the highlight of {brightest} is worth comparing", shading.name());
     }
@@ -294,15 +298,15 @@ fn a_checkerboard_seen_from_afar_has_its_mean_radiance() {
     let smooth = TextureReference { sampler: Sampler::default(), ..sharp(&board) };
     let frame = |texture: TextureReference| {
         let mut world = textured(base_color(texture), Material::matt(Vec3::ONE));
-        // Eight texels to a pixel: mip level 3.
+        // Eight texels per pixel: mip level 3.
         draw(&mut world, 16, 16, &linear()).0
     };
-    // Half of the light is between codes 187 and 188; a mip level keeps the nearer one.
+    // Half of the light is between codes 187 and 188; a mip level stores the nearer one.
     for pixel in frame(smooth.clone()) {
         assert!((pixel - srgb(188)).abs().max_element() < DECODED, "{pixel}");
     }
     assert!((srgb(188) - 0.5).abs() < 3e-3);
-    // Negative controls: averaged codes would show 0.216; without mip levels there are only black and white.
+    // Negative controls: averaged codes would give 0.216; without mip levels there is only black and white.
     let sampler = Sampler { mipmap: Mipmap::None, minify_linear: false, ..Sampler::default() };
     let aliased = frame(TextureReference { sampler, ..smooth });
     assert!(aliased.iter().all(|pixel| (pixel.x - 0.5).abs() > 0.4));
@@ -321,7 +325,7 @@ fn vertex_colours_are_interpolated_and_multiplied() {
     world.entity_mut(entity).insert(Mesh(Arc::new(mesh)));
     for shading in [Shading::Gouraud, Shading::Phong] {
         let options = FrameOptions { shading: Some(shading), ..linear() };
-        // Affine over the pane, so that interpolation over either triangle is exact.
+        // Linear over the pane, so that interpolation over either triangle is exact.
         let expected = |x, y| {
             let uv = pixel_uv(x, y, SIZE);
             Some(DVec3::new(uv.x, 0.5 * uv.y, 0.25))
@@ -332,7 +336,7 @@ fn vertex_colours_are_interpolated_and_multiplied() {
     let settings =
         SceneSettings { ambient: Vec3::ONE, shading: Shading::Gouraud, ..SceneSettings::default() };
     world.insert_resource(settings);
-    // With a texture as well both multiply.
+    // With a texture in addition, both multiply.
     world.entity_mut(entity).insert(base_color(sharp(&image(1, &[[188, 255, 0, 255]]))));
     let expected = |x, y| {
         let uv = pixel_uv(x, y, SIZE);

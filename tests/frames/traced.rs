@@ -1,5 +1,5 @@
-//! Traced pictures against frames: with depth 0 and without shadows the tracer evaluates the same lighting equation, light by light and model
-//! by model, over every pixel inside a surface.
+//! Compares traced pictures with frames: with depth 0 and without shadows the tracer evaluates the same lighting
+//! equation, light by light and model by model, over every pixel inside a surface.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::adapter::{draw, linear, shown};
 
 const SIZE: u32 = 192;
 
-/// A step of eight bits.
+/// One step of eight bits.
 const STEP: f64 = 1.0 / 255.0;
 
 fn traced(world: &mut World, reflection: Option<ReflectionModel>) -> Picture {
@@ -33,7 +33,7 @@ fn traced(world: &mut World, reflection: Option<ReflectionModel>) -> Picture {
     trace(world, &options, &|_| ControlFlow::Continue(())).unwrap().0
 }
 
-/// Over the pixels whose whole neighbourhood shows one surface: there no rounding of coverage shows another.
+/// Compares the pixels whose whole neighbourhood shows one surface, where no rounding of coverage can show another.
 fn against_the_frame(world: &mut World, reflection: Option<ReflectionModel>) -> Difference {
     let twin = TwinOptions { shading: Some(Shading::Phong), reflection, ..TwinOptions::default() };
     let inside = twin::draw(world, SIZE as usize, SIZE as usize, twin).inside_surfaces(false);
@@ -72,7 +72,7 @@ fn every_light_and_reflection_model_is_the_frames() {
 
 #[test]
 fn fog_backs_far_places_and_emissive_faces_are_the_frames() {
-    // A ball that is open at the back of its material, seen from both sides, in each fog.
+    // A ball in each fog.
     for mode in [
         FogMode::Linear { start: 2.0, end: 6.0 },
         FogMode::Exponential { density: 0.2 },
@@ -93,7 +93,7 @@ fn fog_backs_far_places_and_emissive_faces_are_the_frames() {
         let mut objects = world.query::<(&mut Material, &mut Transform, &mut Mesh)>();
         for (mut material, mut place, mut mesh) in objects.iter_mut(&mut world) {
             (material.back, material.double_sided) = (Some(inner), true);
-            // A tilted sheet, mirrored, of which the back is seen.
+            // A tilted, mirrored sheet whose back is visible.
             *mesh = Mesh(Arc::new(shapes::plane(2.0, 2.0, 4, 4)));
             place.rotation = DQuat::from_rotation_x(-0.9);
             place.scale = DVec3::new(-1.0, 1.0, 1.2);
@@ -167,7 +167,7 @@ fn a_picture_is_shown_as_a_frame_is() {
             worst = worst.max((own[channel] - f64::from(pixel[channel])).abs());
         }
     }
-    // Half a step of rounding, and half floats before the curve.
+    // Half a step of rounding, and half floats before the tone curve.
     println!("as shown: {worst:.2} steps apart at most");
     assert!(worst < 1.0, "{worst}");
 }

@@ -1,4 +1,4 @@
-//! Transforms: mirrored, stretched, flattened and nested ones, and places far from the origin.
+//! Transforms: mirrored, stretched, flattened and nested ones, and positions far from the origin.
 
 use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3};
@@ -14,14 +14,14 @@ use crate::adapter::{draw, linear};
 
 const SIZE: usize = 112;
 
-/// f32 against f64, as balls.rs has it.
+/// f32 compared with f64, as in balls.rs.
 const LARGEST: f64 = 1e-4;
 
 fn lamp() -> Light {
     every_light().swap_remove(2).1
 }
 
-/// A ball of polygons large enough that each has an inside, the only place where flat shading can be compared.
+/// A ball of polygons large enough to have an interior, the only place where flat shading can be compared.
 fn coarse_ball() -> World {
     ball_of(shapes::uv_sphere(1.0, 12, 6), lamp())
 }
@@ -51,7 +51,7 @@ fn mirrored_stretched_and_sheared_balls_agree_with_the_twin() {
         let mut world = coarse_ball();
         let entity = mesh_entity(&mut world);
         world.entity_mut(entity).insert(Transform::from_rotation(tilt).with_scale(scale));
-        // A parent of uneven scale above a rotation shears.
+        // A parent with a non-uniform scale above a rotation causes a shear.
         let parent =
             world.spawn(Transform::from_xyz(0.1, 0.0, 0.2).with_scale(DVec3::new(1.0, 0.8, 1.1))).id();
         world.entity_mut(entity).insert(ChildOf(parent));
@@ -79,7 +79,7 @@ fn a_flattened_ball_is_a_disc() {
         assert!(difference.pixels > 30, "{} pixels are too few", difference.pixels);
         assert!(difference.largest < LARGEST, "{}: {difference:?}", shading.name());
     }
-    // Of a line or a point nothing is seen.
+    // A line or a point is not visible.
     let background = glam::Vec3::new(0.1, 0.2, 0.3);
     world.resource_mut::<SceneSettings>().background = background;
     for scale in [DVec3::X, DVec3::ZERO] {
@@ -117,9 +117,11 @@ fn a_thousand_kilometres_away_the_frame_is_the_same() {
         };
         let moved = seen_from_afar(&mut world);
         assert!(moved.pixels > 30, "{} pixels are too few", moved.pixels);
-        // Frame space has its origin at the camera there, so that only its f32 rounds: as near the origin, at most balls.rs' bound apart.
+        // Camera-relative space has its origin at the camera there, so only its f32 rounding matters: as near the
+        // origin, the difference is at most balls.rs' bound.
         assert!(moved.largest < LARGEST, "{}: {moved:?}", shading.name());
-        // Negative control: half of f32's step at 10^6 m, which a renderer without its own origin would round away, is seen.
+        // Negative control: half of f32's step at 10^6 m, which a renderer without camera-relative positions would
+        // lose, is visible.
         world.get_mut::<Transform>(entity).unwrap().translation.x += 0.03;
         assert!(seen_from_afar(&mut world).largest > 10.0 * LARGEST);
     }
@@ -127,7 +129,8 @@ fn a_thousand_kilometres_away_the_frame_is_the_same() {
 
 #[test]
 fn a_child_stands_where_its_parents_put_it() {
-    // A lamp, a ball and the camera, three levels deep, against the same things with their transforms multiplied by hand.
+    // A lamp, a ball and the camera, three levels deep, compared with the same objects with their transforms
+    // multiplied by hand.
     let turn = |angle: f64| DQuat::from_rotation_y(angle) * DQuat::from_rotation_x(0.2);
     let levels = [
         Transform::from_xyz(3.0, -1.0, 2.0).with_rotation(turn(0.7)),
@@ -147,7 +150,7 @@ fn a_child_stands_where_its_parents_put_it() {
     for root in roots {
         nested.entity_mut(root).insert(ChildOf(parent.unwrap()));
     }
-    // The whole scene was moved, turned and scaled by 1: the picture is that of the scene left alone.
+    // The whole scene was moved, rotated and scaled by 1, so the picture is that of the original scene.
     for shading in Shading::ALL {
         let options = TwinOptions { shading: Some(*shading), ..TwinOptions::default() };
         let expected =
@@ -158,7 +161,7 @@ fn a_child_stands_where_its_parents_put_it() {
         assert!(difference.pixels > 30, "{} pixels are too few", difference.pixels);
         assert!(difference.largest < LARGEST, "{}: {difference:?}", shading.name());
     }
-    // Negative control: the middle level counts.
+    // Negative control: the middle level has an effect.
     let middle = nested.get::<ChildOf>(parent.unwrap()).unwrap().parent();
     let ball = mesh_entity(&mut nested);
     nested.entity_mut(ball).insert(ChildOf(middle));
@@ -169,7 +172,7 @@ fn a_child_stands_where_its_parents_put_it() {
 
 #[test]
 fn instances_of_one_mesh_stand_each_in_its_place() {
-    // One mesh, one pipeline, one draw: transforms and materials are each object's own.
+    // One mesh, one pipeline, one draw, while each object has its own transform and material.
     let mut world = ball_of(shapes::cuboid(glam::Vec3::splat(0.5), 1), lamp());
     let first = mesh_entity(&mut world);
     let (mesh, material) =

@@ -1,4 +1,4 @@
-//! Alpha: what a mask cuts out, and what panes of glass let through.
+//! Alpha: what a mask cuts out, and what panes of glass transmit.
 
 use std::sync::Arc;
 
@@ -20,8 +20,8 @@ fn near(a: DVec3, b: DVec3) -> bool {
 
 #[test]
 fn a_mask_keeps_what_reaches_its_cutoff() {
-    // Texture alpha 100, 127, 128, 255 of 255, vertex alpha 1, material alpha 0.5 + 1/256 of rounding room: the products are below and
-    // above the cutoff of 1/4 by at least 1/500, so that no rounding decides.
+    // Texture alpha 100, 125, 130 and 255 of 255, vertex alpha 1, material alpha 0.5: the products are below and above
+    // the cutoff of 1/4 by at least 1/500, so that no rounding decides.
     let texels = [[255, 255, 255, 100], [255, 255, 255, 125], [255, 255, 255, 130], [255, 255, 255, 255]];
     let mask = AlphaMode::Mask { cutoff: 0.25 };
     let material = Material { alpha: 0.5, alpha_mode: mask, ..Material::matt(Vec3::splat(0.5)) };
@@ -39,7 +39,7 @@ fn a_mask_keeps_what_reaches_its_cutoff() {
     for shading in Shading::ALL {
         assert_eq!(row(&mut world, *shading), [false, false, true, true], "{}", shading.name());
     }
-    // What stays is opaque: its colour is not mixed.
+    // What remains is opaque: its colour is not blended.
     assert!(near(draw(&mut world, 4, 4, &linear()).0[3], DVec3::splat(0.5)));
     // Vertex alpha counts too, and a cutoff of 0 keeps everything.
     let mut faded = pane();
@@ -66,13 +66,13 @@ fn two_panes_of_glass_blend_from_the_back() {
         red * near_alpha + (1.0 - near_alpha) * (green * far_alpha + (1.0 - far_alpha) * background);
     let wrong = green * far_alpha + (1.0 - far_alpha) * (red * near_alpha + (1.0 - near_alpha) * background);
     assert!(!near(expected, wrong), "the order matters");
-    // Whichever was made first.
+    // Regardless of which was created first.
     for first_is_near in [true, false] {
         for camera in [orthographic(), perspective()] {
             let mut world = World::new();
             world.spawn(camera);
             let quad = Arc::new(pane());
-            // Far enough to both sides that the frame shows nothing else, perspective or not.
+            // Large enough that the frame shows nothing else, with and without perspective.
             let mut spawn = |near: bool| {
                 let (color, alpha, z) = if near { (red, near_alpha, 1.0) } else { (green, far_alpha, -1.0) };
                 let place = Transform::from_xyz(0.0, 0.0, z).with_scale(DVec3::splat(2.0));
@@ -114,7 +114,7 @@ fn glass_is_hidden_by_what_stands_before_it_and_hides_nothing() {
 fn glass_is_lit_like_any_other_surface() {
     let mut world = World::new();
     world.spawn(orthographic());
-    // The light shines along -z, straight at the pane: l·n = 1.
+    // The light shines along -z, perpendicular to the pane: l·n = 1.
     world.spawn((Light::directional(Vec3::splat(0.5)), Transform::from_xyz(0.0, 0.0, EYE)));
     world.spawn((Mesh(Arc::new(pane())), glass(Vec3::new(1.0, 0.5, 0.0), 0.5)));
     for shading in Shading::ALL {

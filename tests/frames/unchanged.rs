@@ -1,5 +1,5 @@
-//! Frames in which nothing changed: nothing is looked for in the World, nothing uploaded and, where the target is kept, nothing drawn; and whatever changes is seen, to the
-//! bit, by a renderer that has been still.
+//! Frames in which nothing changed: the world is not searched, nothing is uploaded and, where the target is kept,
+//! nothing is drawn. A renderer that has been still detects every change, bit for bit.
 
 use std::sync::Arc;
 
@@ -71,7 +71,7 @@ impl Scene {
     }
 }
 
-/// Whether the World was not looked through: not even the least time was spent on it.
+/// Returns true if the world was not searched, so that no time at all was spent on it.
 fn is_still(report: &FrameReport) -> bool {
     let cpu = &report.statistics.cpu;
     [cpu.transforms_ms, cpu.objects_ms, cpu.lights_ms, cpu.draws_ms, cpu.shadows_ms] == [0.0; 5]
@@ -89,7 +89,7 @@ fn a_still_world_is_not_looked_through_again() {
         (report.statistics.objects, report.statistics.draws, report.statistics.triangles),
         (counts.objects, counts.draws, counts.triangles)
     );
-    // Another texture of the same shape holds the same afterwards: it is drawn, and not looked for.
+    // Another texture of the same shape has the same content afterwards: it is drawn without searching the world.
     scene.target = Offscreen::new(gpu(), SIZE, SIZE, OffscreenFormat::Rgba8).unwrap();
     let (other, report) = scene.frame();
     assert!(is_still(&report) && other == first);
@@ -100,7 +100,7 @@ fn a_still_world_is_not_looked_through_again() {
     scene.target = target;
     let (back, report) = scene.frame();
     assert!(!is_still(&report) && back == first);
-    // A target that was overwritten is drawn anew.
+    // A target that was overwritten is drawn again.
     let mut world = World::new();
     world.spawn((Camera::default(), Transform::IDENTITY));
     Renderer::new(gpu()).render(&mut world, &scene.target.target(), &scene.options).unwrap();
@@ -114,7 +114,7 @@ fn a_target_that_is_kept_is_left_alone() {
     let mut scene = scene();
     let (first, _) = scene.rest();
     scene.options.keep_unchanged = true;
-    // Which the option does not change by itself.
+    // The option by itself does not cause a redraw.
     let (kept, report) = scene.frame();
     assert!(kept == first);
     assert_eq!(report.plan.running().count(), 0);
@@ -127,7 +127,7 @@ fn a_target_that_is_kept_is_left_alone() {
     scene.world.get_mut::<Transform>(scene.ball).unwrap().translation.x += 0.5;
     let (moved, report) = scene.frame();
     assert!(moved != first && report.plan.running().count() > 0);
-    // Into another texture it is drawn.
+    // Another texture is drawn to.
     scene.rest();
     let target = Offscreen::new(gpu(), SIZE, SIZE, OffscreenFormat::Rgba8).unwrap();
     let kept = std::mem::replace(&mut scene.target, target);
@@ -137,7 +137,7 @@ fn a_target_that_is_kept_is_left_alone() {
     assert!(scene.frame().0 == moved);
 }
 
-/// Names of changes, and what they do.
+/// The name of a change, and what it does.
 type Change = (&'static str, fn(&mut Scene));
 
 #[test]
@@ -218,12 +218,12 @@ fn whatever_changes_is_seen() {
     }
 }
 
-/// An effect that cannot be drawn as long as it is broken, and that looks at a component of its own.
+/// An effect that cannot be drawn while it is broken, and that reads a component of its own.
 struct Fragile {
     called_for: bool,
 }
 
-/// Of any entity.
+/// A component of any entity.
 #[derive(Component)]
 struct Broken(bool);
 
@@ -255,13 +255,13 @@ fn a_frame_that_fails_leaves_no_shadow_map_for_drawn() {
     let broken = scene.world.spawn(Broken(true)).id();
     let failed = scene.renderer.render(&mut scene.world, &scene.target.target(), &scene.options);
     assert!(matches!(failed, Err(RenderError::Effect { effect: "fragile", .. })), "{failed:?}");
-    // Nor is what an effect looks at taken for still.
+    // An effect's own components are also checked for changes.
     scene.world.get_mut::<Broken>(broken).unwrap().0 = false;
     let (whole, report) = scene.frame();
     assert!(report.plan.status("shadow maps").unwrap().runs(), "they were never drawn");
     let mut fresh = self::scene();
     assert!(whole == fresh.frame().0);
-    // A map that was there, and that a frame that failed would have drawn again.
+    // A map that existed, and that a failed frame would have drawn again.
     scene.world.get_mut::<Transform>(scene.ball).unwrap().translation.x += 0.4;
     scene.world.get_mut::<Broken>(broken).unwrap().0 = true;
     assert!(scene.renderer.render(&mut scene.world, &scene.target.target(), &scene.options).is_err());

@@ -1,8 +1,8 @@
-//! A hard case and what came of it.
+//! A hard case and its outcome.
 
 use std::fmt;
 
-/// One case: a row of the list of hard cases, a name, and how it is run.
+/// One case: its row in the list of hard cases, its name, and the function that runs it.
 #[derive(Clone, Copy)]
 pub struct Case {
     pub row: &'static str,
@@ -11,19 +11,19 @@ pub struct Case {
 }
 
 impl Case {
-    /// Runs it as a test.
+    /// Runs the case as a test.
     pub fn check(&self) {
         let outcome = (self.run)();
         assert!(outcome.passes(), "{}: {outcome}", self.name);
     }
 }
 
-/// What was expected and what came.
+/// The expected and the actual result.
 #[derive(Clone, Debug)]
 pub enum Outcome {
-    /// A number within a bound, which has its reason.
+    /// A number that must be within a bound, with the reason for the bound.
     Number { expected: f64, got: f64, bound: f64, because: &'static str },
-    /// An answer in words that has to hold this.
+    /// A text that must contain the expected one.
     Text { expected: &'static str, got: String },
 }
 
@@ -36,7 +36,7 @@ impl Outcome {
         Self::Text { expected, got }
     }
 
-    /// The pair that is farthest apart of its own bound.
+    /// Returns the pair with the largest difference, with the bound that holds for all pairs.
     pub fn worst(pairs: impl IntoIterator<Item = (f64, f64)>, bound: f64, because: &'static str) -> Self {
         let apart = |(expected, got): &(f64, f64)| {
             let apart = (expected - got).abs();
@@ -58,7 +58,7 @@ impl Outcome {
 /// The heading of the table.
 pub const HEADING: &str = "| case | expected | got | bound | why | pass |\n|---|---|---|---|---|---|";
 
-/// Nine digits, in whichever notation shows them.
+/// Formats a number with nine digits, in the shorter notation.
 fn shortest(number: f64) -> String {
     let size = number.abs();
     if size == 0.0 || (1e-4..1e6).contains(&size) {
@@ -85,7 +85,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// Lists cases under their row, and makes a test of each.
+/// Lists cases under their rows, and makes a test of each.
 #[macro_export]
 macro_rules! cases {
     ($($row:literal { $($name:ident),+ $(,)? })+) => {

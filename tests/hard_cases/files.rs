@@ -1,4 +1,4 @@
-//! Cases that files bring: what is refused, by name, and what is repaired, with a note.
+//! Cases that come from files: what is rejected, with a name, and what is repaired, with a note.
 
 use bevy_ecs::world::World;
 use lumbre_optics::Light;
@@ -15,7 +15,7 @@ crate::cases! {
     }
 }
 
-/// A file with one light of these keys and one triangle with normals of zero.
+/// Loads a file with one light with these keys and one triangle whose normals are zero.
 fn load(light: Value, phong: Value) -> Result<(World, Vec<String>), String> {
     let mut light = light;
     light["name"] = "the lamp".into();
@@ -87,7 +87,7 @@ fn attenuation_negative() -> Outcome {
 }
 
 fn attenuation_too_large() -> Outcome {
-    // JSON has no NaN; this is what becomes infinite in f32.
+    // JSON has no NaN; this number becomes infinite in f32.
     Outcome::text(
         "light \"the lamp\": attenuation.constant is inf",
         refusal(json!({}), json!({"attenuation": [1e300, 0, 0]})),

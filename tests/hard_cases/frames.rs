@@ -1,4 +1,4 @@
-//! Cases of whole frames: what is broken stays out of the picture, what is extreme keeps its value.
+//! Cases of whole frames: broken input does not reach the picture, and extreme input keeps its value.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ fn matt(color: f32) -> Material {
     Material::matt(Vec3::splat(color))
 }
 
-/// The middle of a frame of 9 x 9.
+/// Returns the middle pixel of a frame of 9 x 9.
 fn middle(world: &mut World, options: &FrameOptions) -> DVec3 {
     draw(world, 9, 9, options).0[40]
 }
@@ -48,7 +48,7 @@ fn a_light_in_the_surface() -> Outcome {
         Light { attenuation: Attenuation::INVERSE_SQUARE, ..Light::point(Vec3::ONE) },
         Transform::IDENTITY,
     ));
-    // The centre pixel is the light's own place: no direction, so ambient light alone, 0.5 * 1.
+    // The centre pixel is at the light's own position: no direction, so ambient light alone, 0.5 * 1.
     let got = middle(&mut world, &linear());
     Outcome::number(0.5, grey(got), 1e-7, "no direction there: the ambient part only")
 }
@@ -66,7 +66,7 @@ fn in_opengls_display_it_is_clamped() -> Outcome {
     )
 }
 
-/// A pane under a light of 1e30.
+/// A pane under a light of intensity 1e30.
 fn dazzling() -> World {
     let mut world = pane_of(matt(1.0));
     let above = Transform::from_xyz(0.0, 0.0, 1.0).looking_at(DVec3::ZERO, DVec3::Y);
@@ -81,7 +81,7 @@ fn a_light_of_1e30_in_full_precision() -> Outcome {
 }
 
 fn a_light_of_1e30_in_half_precision() -> Outcome {
-    // As people see it: half floats, a tone curve, eight bits. The probe looks into the half floats.
+    // With the default display: half floats, a tone curve, eight bits. The probe inspects the half floats.
     let bytes = shown(&mut dazzling(), 9, 9, &FrameOptions::default());
     let white = bytes.into_iter().map(|byte| (255.0, f64::from(byte)));
     Outcome::worst(white.collect::<Vec<_>>(), 0.0, "white: the largest half, 65504, and no infinity")
@@ -93,7 +93,7 @@ fn two_panes(distance: f64, apart: f64, near: f64, far: Option<f64>) -> Outcome 
     let mesh = Arc::new(pane());
     let scale = DVec3::splat(distance);
     let at = |z: f64| Transform { scale, ..Transform::from_xyz(0.0, 0.0, z) };
-    // The nearer is dark, and drawn last or first: depth decides.
+    // The nearer pane is dark and drawn last or first: depth decides.
     world.spawn((Mesh(Arc::clone(&mesh)), matt(0.25), at(-distance)));
     world.spawn((Mesh(Arc::clone(&mesh)), matt(0.75), at(-distance - apart)));
     world.spawn((Mesh(mesh), matt(0.75), at(-distance - apart)));
@@ -108,7 +108,8 @@ fn two_panes(distance: f64, apart: f64, near: f64, far: Option<f64>) -> Outcome 
     )
 }
 
-// 2^-20 of the distance apart: the depth near/d has a rounding of 2^-24 in f32, the planes' places and the interpolation a few.
+// The bound is 2^-20 of the distance between the panes: the depth near/d has a rounding of 2^-24 in f32, and the
+// planes' positions and the interpolation a few.
 
 fn a_millimetre_at_a_kilometre() -> Outcome {
     two_panes(1e3, 1e-3, 1e-3, None)
@@ -195,14 +196,14 @@ fn fifty_sizes_in_a_row() -> Outcome {
     Outcome::worst(all.collect::<Vec<_>>(), 0.0, "k_a I_a at every size (windows: lumbre_demo's tests)")
 }
 
-/// A device of its own, lost after its first frame; and what the renderer says to the second.
+/// Creates a separate device, destroys it after its first frame, and returns what the renderer says to the second.
 fn lost() -> (World, String) {
     let gpu = Gpu::headless().unwrap();
     let mut world = pane_of(matt(0.5));
     let frame = Offscreen::new(&gpu, 1, 1, OffscreenFormat::LinearFloat).unwrap();
     let mut renderer = Renderer::new(&gpu);
     renderer.render(&mut world, &frame.target(), &linear()).unwrap();
-    // Lost while the frame is still being drawn.
+    // Destroyed while the frame is still being drawn.
     gpu.device.destroy();
     let refused = renderer.render(&mut world, &frame.target(), &linear());
     let said = refused.err().map_or_else(|| "drawn".to_owned(), |error| error.to_string());

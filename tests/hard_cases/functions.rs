@@ -31,7 +31,7 @@ crate::cases! {
 }
 
 const VECTORS: [Type; 4] = [Type::Vector, Type::Vector, Type::Vector, Type::Number];
-/// A rounding of f32.
+/// One rounding of f32.
 const U: f64 = 5.960_464_477_539_063e-8;
 
 fn run(
@@ -96,7 +96,8 @@ fn microfacets_of_opposites() -> Outcome {
     Outcome::number(0.0, got, 0.0, "the viewer is behind the surface")
 }
 
-/// Light and viewer graze the surface from opposite sides: the sum is 2e along the normal, and h is the normal itself however small.
+/// Light and viewer graze the surface from opposite sides: their sum is 2e along the normal, so h is the normal
+/// itself however small e is.
 const NEARLY_OPPOSITE: [f32; 3] = [1e-2, 1e-6, 1e-12];
 
 fn nearly_opposite(function: &str, module: &str, shininess: f32) -> Vec<f64> {
@@ -120,7 +121,7 @@ fn a_half_vector_of_nearly_opposites() -> Outcome {
 
 fn a_highlight_of_nearly_opposites() -> Outcome {
     let got = nearly_opposite("blinn_phong", "blinn_phong", 128.0);
-    // 1 - 9 u to the 128th, and pow's own 4.2e-5.
+    // 1 - 9 u to the 128th power, and pow's own 4.2e-5.
     Outcome::worst(
         got.into_iter().map(|x| (1.0, x)),
         4.4e-5,
@@ -156,7 +157,8 @@ fn exponent_zero_behind_the_surface() -> Outcome {
     Outcome::number(0.0, got, 0.0, "gated on n.l")
 }
 
-/// The lobe where it is about 1/2, with the sine known to 5 roundings: the logarithm's series leaves 1e-7, exp about 1e-6.
+/// The lobe at about 1/2, with the sine off by 5 roundings: the logarithm's series is off by 1e-7, exp by about
+/// 1e-6.
 fn sharp_lobe(exponent: f64) -> Outcome {
     let angle = (2.0 * std::f64::consts::LN_2 / exponent).sqrt().min(1.0);
     let axis = DVec3::Y.as_vec3();
@@ -224,7 +226,7 @@ fn fresnel_of_a_metal_at_ninety_degrees() -> Outcome {
 }
 
 fn just_inside_the_critical_angle() -> Outcome {
-    // 1e-3 below the critical sine of glass to air.
+    // A thousandth below the critical sine of glass to air.
     let (eta, sine) = (1.0f32 / 1.5, (1.0f32 / 1.5) * 0.999);
     let got = numbers("snell", "transmitted_cosine", &[sine, eta]);
     let expected = transmitted_cosine(sine.into(), eta.into());
@@ -233,7 +235,7 @@ fn just_inside_the_critical_angle() -> Outcome {
 }
 
 fn beyond_the_critical_angle() -> Outcome {
-    // cos of 60 degrees, inside glass: sin .87 > 1/1.5.
+    // The cosine of 60 degrees, inside glass: sin .87 > 1/1.5.
     let got = numbers("fresnel", "fresnel_dielectric", &[0.5, 1.0 / 1.5]);
     Outcome::number(1.0, got, 0.0, "total reflection is a branch of its own")
 }
@@ -273,7 +275,7 @@ fn inner_equals_outer() -> Outcome {
     let cosine = (0.5f64.cos() + 0.0005) as f32;
     let outer = f64::from(0.5f64.cos() as f32);
     let expected = ((f64::from(cosine) - outer) / 0.001).powi(2);
-    // A cosine's rounding over a width of .001, twice.
+    // A cosine's rounding over a width of .001, doubled by the square.
     Outcome::number(expected, spot(cone, cosine), 4.0 * U / 0.001, "half way over the least width of .001")
 }
 
@@ -286,7 +288,7 @@ fn exponent_128_off_the_axis() -> Outcome {
     let cosine = 0.99f32;
     let got = spot(SpotCone::Exponent { cutoff: 1.0, exponent: 128.0 }, cosine);
     let expected = f64::from(cosine).powi(128);
-    // log2 is good to 2^-21 there: times 128 ln 2.
+    // log2 is good to 2^-21 there, which is multiplied by 128 ln 2.
     Outcome::number(expected, got, expected * 5e-5, "pow: 128 times the error of log2, 2^-21")
 }
 

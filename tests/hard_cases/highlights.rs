@@ -1,5 +1,5 @@
-//! Cases of highlights in whole frames: exponents from 1 to a million at several angles near the peak, and what a pixel shows of a
-//! highlight that is smaller than it.
+//! Cases of highlights in whole frames: exponents from 1 to a million at several angles near the peak, and
+//! highlights smaller than a pixel.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ crate::cases! {
     "specular aliasing" { a_highlight_smaller_than_a_pixel_keeps_its_light, without_the_filter_it_does_not }
 }
 
-/// The share of the peak at which the highlight is looked at.
+/// The fractions of the peak at which the highlight is evaluated.
 const SHARES: [f64; 6] = [1.0, 0.99, 0.9, 0.5, 0.1, 0.01];
 
 fn shiny(shininess: f32) -> Material {
@@ -36,8 +36,8 @@ fn shiny(shininess: f32) -> Material {
     Material { front, ..Material::default() }
 }
 
-/// A distant light along a distant viewer's line of sight, and a pane whose normals are tilted off it: r.v is cos 2a for Phong, n.h is
-/// cos a for Blinn and Phong, the same at every pixel.
+/// A distant light along a distant viewer's line of sight, and a pane with tilted normals: r.v is cos 2a for Phong
+/// and n.h is cos a for Blinn, the same at every pixel.
 fn peaks(shininess: f32, bound: f64, because: &'static str) -> Outcome {
     let mut pairs = Vec::new();
     for model in [ReflectionModel::Phong, ReflectionModel::Blinn] {
@@ -55,14 +55,14 @@ fn peaks(shininess: f32, bound: f64, because: &'static str) -> Outcome {
             let tilt = if model == ReflectionModel::Phong { 0.5 * angle } else { angle };
             let mut mesh = pane();
             mesh.normals = vec![DVec3::new(tilt.sin(), 0.0, tilt.cos()).as_vec3(); 4];
-            // The normal as it is rounded, made unit.
+            // The normal after rounding to f32, normalized.
             let normal = mesh.normals[0].as_dvec3().normalize();
             world.entity_mut(entity).insert(Mesh(Arc::new(mesh)));
             let cosine = match model {
                 ReflectionModel::Phong => (2.0 * normal.z * normal - DVec3::Z).z,
                 _ => normal.z,
             };
-            // cos^n from the sine, which f64's cosine of a small angle has lost.
+            // cos^n computed from the sine, as the cosine of a small angle loses its digits even in f64.
             let sine = normal.x * if model == ReflectionModel::Phong { 2.0 * normal.z } else { 1.0 };
             let logarithm = if cosine > 0.5 { 0.5 * (-sine * sine).ln_1p() } else { cosine.max(0.0).ln() };
             let expected = if cosine > 0.0 { (f64::from(shininess) * logarithm).exp() } else { 0.0 };
@@ -72,9 +72,10 @@ fn peaks(shininess: f32, bound: f64, because: &'static str) -> Outcome {
     Outcome::worst(pairs, bound, because)
 }
 
-// Up to 256 pow(cosine, n): its logarithm is good to 2^-21, 8 roundings, and the cosine to some 10 after two unit vectors and a
-// reflection, so n (10 + 8 ln 2) 2^-24. Beyond it the sine counts: n/2 of the error of sin^2, which is 5 roundings of the sine of
-// the highlight's edge, sqrt(2 ln 100 / n), and 2 10 roundings from the reflected vector; exp and the series add 10^-6.
+// Up to exponent 256 it is pow(cosine, n): its logarithm is good to 2^-21, 8 roundings, and the cosine to some 10
+// after two unit vectors and a reflection, so the bound is n (10 + 8 ln 2) 2^-24. Beyond it the sine matters: n/2
+// times the error of sin^2, which is 5 roundings of the sine of the highlight's edge, sqrt(2 ln 100 / n), and 2 10
+// roundings from the reflected vector; exp and the series add 10^-6.
 
 fn plain(shininess: f32) -> Outcome {
     let u = 0.5f64.powi(24);
@@ -84,7 +85,7 @@ fn plain(shininess: f32) -> Outcome {
 
 fn sharp(shininess: f32) -> Outcome {
     let u = 0.5f64.powi(24);
-    // s^n has its steepest slope, n s, where s^2 = 1/n: e^(-1/2) sqrt(n) of a sine that is off by 20 u.
+    // The lobe has its steepest slope where s^2 = 1/n, e^(-1/2) sqrt(n), times a sine that is off by 20 u.
     let bound = 0.61 * f64::from(shininess).sqrt() * 20.0 * u + 1e-6;
     peaks(
         shininess,
@@ -128,8 +129,9 @@ fn a_frame_of_exponent_a_million() -> Outcome {
 const BALL: u32 = 64;
 const EXPONENT: f32 = 1e5;
 
-/// All light that a ball of 1 m sends to a distant viewer who stands behind the light, over what it is: the integral of cos^n over the
-/// ball's disc, 2 pi/(n + 2). The highlight is a tenth of a pixel wide; the ball is shifted by parts of a pixel.
+/// Returns the light that a ball of 1 m reflects to a distant viewer behind the light, relative to its exact value:
+/// the integral of cos^n over the ball's disc, 2 pi/(n + 2). The highlight is a tenth of a pixel wide; the ball is
+/// shifted by fractions of a pixel.
 fn light_of_a_ball(filtered: bool) -> Vec<f64> {
     let mut world = World::new();
     let ball = world.spawn((Mesh(Arc::new(shapes::uv_sphere(1.0, 256, 128))), shiny(EXPONENT))).id();
@@ -153,8 +155,9 @@ fn light_of_a_ball(filtered: bool) -> Vec<f64> {
 }
 
 fn a_highlight_smaller_than_a_pixel_keeps_its_light() -> Outcome {
-    // The widened lobe is a Gaussian whose deviation is half a pixel or more: sums over pixels ripple by 2 exp(-2 pi^2 / 4) = 1.4 %
-    // along each axis, and derivatives are differences over a pixel of 0.04 rad, off by less than 1 %.
+    // The widened lobe is a Gaussian whose standard deviation is half a pixel or more. Sums over pixels ripple by 2
+    // exp(-2 pi^2 / 4) = 1.4 % along each axis, and derivatives are differences over a pixel of 0.04 rad, off by
+    // less than 1 %.
     let pairs = light_of_a_ball(true).into_iter().map(|got| (1.0, got));
     Outcome::worst(
         pairs,
@@ -164,7 +167,7 @@ fn a_highlight_smaller_than_a_pixel_keeps_its_light() -> Outcome {
 }
 
 fn without_the_filter_it_does_not() -> Outcome {
-    // Between four pixels it is not seen at all: the negative control.
+    // Control: between four pixels the highlight is not visible at all.
     let least = light_of_a_ball(false).into_iter().fold(f64::MAX, f64::min);
     Outcome::number(
         0.0,

@@ -1,5 +1,5 @@
-//! Cases of the lists of lights that each object has in place of clusters: what is at, around or behind the camera, at the end of a
-//! range, in no list, in ten thousand.
+//! Cases of the lists of lights per object, used in place of clusters: objects at, around or behind the camera,
+//! lights at the end of their range, empty lists, and ten thousand lights.
 
 use std::sync::Arc;
 
@@ -26,10 +26,10 @@ crate::cases! {
     }
 }
 
-/// A rounding of f32.
+/// One rounding of f32.
 const U: f64 = 5.960_464_477_539_063e-8;
 
-/// Lists of objects, where the frame would take those of clusters.
+/// Options that use lists per object where the frame would use those of clusters.
 fn by_objects() -> FrameOptions {
     FrameOptions { light_lists: LightLists::Objects, ..linear() }
 }
@@ -52,7 +52,8 @@ fn lamp(range: f32) -> Light {
 }
 
 fn an_object_around_the_camera() -> Outcome {
-    // Inside a box, whose middle is the eye: depth 0. The lamp is there too, so that n.l is 1 straight ahead, on all six sides.
+    // The camera is at the centre of a box, at depth 0. The lamp is there too, so that n.l is 1 straight ahead on
+    // all six sides.
     let mut world = World::new();
     world.spawn((Mesh(Arc::new(shapes::cuboid(Vec3::ONE, 1))), white()));
     world.spawn((lamp(f32::INFINITY), Transform::IDENTITY));
@@ -69,7 +70,7 @@ fn an_object_around_the_camera() -> Outcome {
 }
 
 fn an_object_in_the_cameras_plane() -> Outcome {
-    // The eye lies in the pane's plane, beside a wall that is seen: of the pane nothing is.
+    // The eye is in the pane's plane, so the pane itself is not visible, and looks at a wall.
     let mut world = pane_of(Material::matt(Vec3::splat(0.25)));
     let turn = Transform::from_xyz(0.0, 0.0, 2.0).looking_at(DVec3::new(1.0, 0.0, 2.0), DVec3::Y);
     world.spawn((Mesh(Arc::new(pane())), Material { double_sided: true, ..Material::matt(Vec3::ONE) }, turn));
@@ -106,7 +107,7 @@ fn an_object_behind_the_camera() -> Outcome {
 
 fn a_list_ends_where_the_range_does() -> Outcome {
     let mut world = pane_of(Material::matt(Vec3::ONE));
-    // 4 m from the nearest point of the pane, and the float before and after.
+    // The range is the distance of 4 m to the nearest point of the pane, and the float before and after.
     let mut lists = Vec::new();
     let lamp_entity = world.spawn(Transform::from_xyz(0.0, 0.0, 4.0)).id();
     for range in [4f32.next_down(), 4.0, 4f32.next_up()] {
@@ -140,7 +141,7 @@ fn the_last_tenth_of_a_range() -> Outcome {
 }
 
 fn an_empty_list_beside_full_ones() -> Outcome {
-    // Three panes in a row; lamps of a short range over the outer two.
+    // Three panes in a row, with lamps of a short range over the outer two.
     let mut world = World::new();
     let mesh = Arc::new(pane());
     let narrow = DVec3::new(0.2, 1.0, 1.0);
@@ -187,7 +188,8 @@ fn lit(light: &Light, places: &[DVec3], point: DVec3) -> f64 {
 }
 
 fn lists_while_objects_come_and_go() -> Outcome {
-    // The same frame whatever stood in the lists before: objects are hidden and shown, lights switched, and it ends as it began.
+    // The frame does not depend on the lists of earlier frames: objects are hidden and shown, lights switched, and
+    // the last frame equals the first.
     let mut world = World::new();
     let mesh = Arc::new(pane());
     let objects: Vec<Entity> = (0..8)
@@ -229,7 +231,8 @@ fn strip(number: u32) -> f64 {
     -1.0 + 2.0 * (f64::from(number) + 0.5) / f64::from(STRIPS)
 }
 
-/// A pane cut into a thousand strips, and ten thousand lamps of a short range over it: no two strips have the same list.
+/// A pane cut into a thousand strips, and ten thousand lamps of a short range over it, so that no two strips have
+/// the same list.
 fn strips() -> (World, Vec<DVec3>, Light) {
     let mut world = World::new();
     let mesh = Arc::new(pane());
@@ -242,7 +245,7 @@ fn strips() -> (World, Vec<DVec3>, Light) {
         world.spawn((Mesh(Arc::clone(&mesh)), Material::matt(Vec3::ONE), place));
     }
     let light = Light { diffuse: Vec3::splat(1e-3), ..lamp(REACH) };
-    // Points of a lattice by the golden ratio: evenly spread, in no order.
+    // Points of a lattice by the golden ratio: evenly spread and unordered.
     let places: Vec<DVec3> = (0..LAMPS)
         .map(|i| {
             let turn = (f64::from(i) * 0.618_033_988_749_895).fract();
@@ -264,7 +267,8 @@ fn ten_thousand_lights_in_a_thousand_different_lists() -> Outcome {
         .iter()
         .enumerate()
         .map(|(at, pixel)| (lit(&light, &places, pixel_point(at % 24, at / 24, 24)), grey(*pixel)));
-    // Some 300 lamps reach a point, each off by 60 u of a window and 2 u of the point times its slope of 16 per metre, of 10^-3.
+    // About 300 lamps of 10^-3 reach a point, each off by 60 u of its window and by 2 u of the point's position
+    // times a slope of 16 per metre.
     let pairs: Vec<_> = pairs.collect();
     assert!(pairs.iter().any(|(expected, _)| *expected > 0.05), "{pairs:?}");
     Outcome::worst(

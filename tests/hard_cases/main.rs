@@ -1,5 +1,6 @@
-//! The hard cases of lighting and rasterizing, each with the value that it must give and the bound that it must keep.
-//! `cargo test --workspace --test hard_cases -- --nocapture table` prints them all; each is a test of its own too.
+//! The hard cases of lighting and rasterizing, each with the value that it must give and the bound that it must
+//! keep. `cargo test --workspace --test hard_cases -- --nocapture table` prints them all; each is also a separate
+//! test.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
@@ -22,7 +23,7 @@ mod table;
 
 use table::Table;
 
-/// The rows of the list in its order, each with what is done about it; and two that hold for every frame.
+/// The rows of the list in order, each with how it is handled; and two that hold for every frame.
 const ROWS: [(&str, &str); 19] = [
     (
         "normal of length 0",
@@ -99,7 +100,7 @@ const ROWS: [(&str, &str); 19] = [
     ("fog", "A fog of no length is a step, and nothing overflows at any distance."),
 ];
 
-/// Every case, by row.
+/// Returns every case, by row.
 fn whole() -> Table {
     let cases = [
         functions::cases(),
@@ -117,7 +118,8 @@ fn whole() -> Table {
     Table::new("Hard cases of lighting and rasterizing", &ROWS, cases.concat())
 }
 
-/// Runs all and prints the table. With LUMBRE_WRITE_TABLES=1 it becomes its part of docs/hard-cases.md too.
+/// Runs all cases and prints the table. With LUMBRE_WRITE_TABLES=1 it is also written to its part of
+/// docs/hard-cases.md.
 #[test]
 fn table() {
     let about = format!(

@@ -88,7 +88,7 @@ fn a_light_exactly_at_its_range() -> Outcome {
 }
 
 fn ten_thousand_lights_on_a_thousand_objects() -> Outcome {
-    // Ten million entries of lists if they were not shared: objects that the same lights reach share one.
+    // Without sharing there would be ten million list entries; objects that the same lights reach share one list.
     let mut world = World::new();
     let mesh = std::sync::Arc::new(pane());
     for number in 0..1000 {
@@ -109,7 +109,7 @@ fn ten_thousand_lights_on_a_thousand_objects() -> Outcome {
 }
 
 fn an_object_across_the_cameras_plane() -> Outcome {
-    // A floor that runs under the camera, lit by a lamp behind it: what is in view has the lamp's light.
+    // A floor that extends under the camera, lit by a lamp behind it: the visible part is lit by the lamp.
     let mut world = World::new();
     let floor = std::sync::Arc::new(lumbre_mesh::shapes::plane(40.0, 40.0, 1, 1));
     world.spawn((Mesh(floor), Material::matt(Vec3::ONE)));

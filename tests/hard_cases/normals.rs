@@ -1,4 +1,4 @@
-//! Cases of normals without a length: triangles without area, averages that cancel, zeros in code.
+//! Cases of normals without a length: triangles without area, averages that cancel, zeros set in code.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ fn grey(color: DVec3) -> f64 {
     color.element_sum() / 3.0
 }
 
-/// The mesh under ambient light of 1 and a light straight on; k is 0.5.
+/// The mesh under ambient light of 1 and a light along its normal; k is 0.5.
 fn lit(mesh: TriangleMesh, shading: Shading) -> Vec<f64> {
     let mut world = pane_of(Material::matt(Vec3::splat(0.5)));
     let entity = world.query_filtered::<Entity, With<Mesh>>().single(&world).unwrap();
@@ -36,7 +36,7 @@ fn lit(mesh: TriangleMesh, shading: Shading) -> Vec<f64> {
     draw(&mut world, 16, 16, &options).0.into_iter().map(grey).collect()
 }
 
-/// The pane with a point, an edge and a line of three points as triangles.
+/// The pane with a point, an edge and three collinear points as additional triangles.
 fn with_degenerate_triangles() -> TriangleMesh {
     let mut mesh = pane();
     let first = mesh.positions.len() as u32;
@@ -63,7 +63,7 @@ fn degenerate_triangles_leave_the_frame_as_it_is() -> Outcome {
 }
 
 fn a_vertex_of_degenerate_triangles_only() -> Outcome {
-    // Averaged: the line's points have no face, the pane's keep theirs.
+    // When averaging, the points of the line have no face, and the pane's vertices keep their normals.
     let smooth = compute_smooth_normals(&with_degenerate_triangles(), NormalWeight::Angle).unwrap();
     assert_eq!((smooth.cancelled, smooth.missing), (0, 3));
     let expected = [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
@@ -75,7 +75,7 @@ fn a_vertex_of_degenerate_triangles_only() -> Outcome {
     )
 }
 
-/// The pane with the same triangles turned the other way: every average is 0.
+/// The pane with the same triangles in opposite winding too: every average is 0.
 fn two_faced() -> TriangleMesh {
     let mut mesh = pane();
     mesh.normals.clear();
@@ -117,7 +117,8 @@ fn zero_normals_in_code_under_flat_shading() -> Outcome {
 }
 
 fn normals_that_cancel_across_a_triangle() -> Outcome {
-    // Right and left edge point opposite ways, +x and -x: interpolated, the normal is of the sign of x and 0 in the middle.
+    // The normals of the right and left edges are opposite, +x and -x: the interpolated normal has the sign of x,
+    // and is 0 in the middle.
     let mut mesh = pane();
     mesh.normals = mesh.positions.iter().map(|position| Vec3::X * position.x).collect();
     let mut world = pane_of(Material::matt(Vec3::splat(0.5)));
@@ -126,7 +127,8 @@ fn normals_that_cancel_across_a_triangle() -> Outcome {
     let sun = Transform::from_xyz(1.0, 0.0, 0.0).looking_at(DVec3::ZERO, DVec3::Y);
     world.spawn((Light::directional(Vec3::ONE), sun));
     let (pixels, _) = draw(&mut world, 17, 17, &linear());
-    // The middle column's normal is 0 or what rounding leaves of it: either half, or none, of the light is right there.
+    // In the middle column the normal is 0 or what rounding leaves of it, so half of the light or none is correct
+    // there.
     let pairs = pixels
         .iter()
         .enumerate()

@@ -1,5 +1,5 @@
-//! Cases of numbers that are too large or are none, in components made in code: products that leave f32, what half floats hold, fog,
-//! exposure and vertex colours without a number.
+//! Cases of numbers that are too large or not numbers, in components made in code: products that overflow f32 or
+//! half floats, and fog, exposure and vertex colours that are not numbers.
 
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ fn middle(world: &mut World) -> f64 {
     grey(draw(world, 9, 9, &linear()).0[40])
 }
 
-/// A directional light that meets the pane square on, or from behind.
+/// A directional light perpendicular to the pane, from its front or from behind.
 fn sun(color: f32, in_front: bool) -> (Light, Transform) {
     let z = if in_front { 1.0 } else { -1.0 };
     (
@@ -50,7 +50,7 @@ fn sun(color: f32, in_front: bool) -> (Light, Transform) {
     )
 }
 
-/// All coefficients of this size, under ambient light of 1.
+/// A pane with all coefficients of this size, under ambient light of 1.
 fn coefficients(size: f32) -> World {
     let color = Vec3::splat(size);
     let front =
@@ -70,7 +70,7 @@ fn white(world: &mut World, options: FrameOptions, because: &'static str) -> Out
 fn the_largest_product_on_the_lit_side() -> Outcome {
     let mut world = coefficients(1e30);
     world.spawn(sun(INTENSITY, true));
-    // k_d L (n.l) + k_s L (r.v), both with a cosine of 1, at the pixel that the eye's foot is in.
+    // k_d L (n.l) + k_s L (r.v), both with a cosine of 1, at the pixel straight ahead.
     let expected = 2.0 * COEFFICIENT * f64::from(INTENSITY);
     Outcome::number(
         expected,
@@ -92,7 +92,7 @@ fn the_largest_product_behind_the_surface() -> Outcome {
 }
 
 fn the_brightest_highlight() -> Outcome {
-    // Blinn's model divides by n.v: normals that graze a distant viewer make 10^4 times the light.
+    // Blinn's model divides by n.v: normals that graze a distant viewer give 10^4 times the light.
     let color = Vec3::splat(1e30);
     let front = Surface { ambient: Vec3::ZERO, diffuse: Vec3::ZERO, specular: color, ..Surface::default() };
     let mut world = pane_of(Material { front, ..Material::default() });
@@ -102,14 +102,15 @@ fn the_brightest_highlight() -> Outcome {
     world.entity_mut(entity).insert(Mesh(Arc::new(mesh)));
     let reflection = ReflectionModel::TorranceSparrow;
     world.insert_resource(SceneSettings { reflection, local_viewer: false, ..SceneSettings::default() });
-    // Where the mirrored viewer is.
+    // The mirror direction of the viewer.
     let light = DVec3::new(2e-4, 0.0, -1.0).normalize();
     let place = Transform::from_translation(light).looking_at(DVec3::ZERO, DVec3::Y);
     world.spawn((Light::directional(Vec3::splat(INTENSITY)), place));
     let normal = DVec3::new(1.0, 0.0, 1e-4).normalize();
     let model = lumbre_optics::torrance_sparrow(normal, light, DVec3::Z, 1.0, 1.5);
     let expected = model * COEFFICIENT * f64::from(INTENSITY);
-    // n.v, n.l and v.h are 10^-4 from components of 1: a rounding of 2^-24 is 6e-4 of them, and G/(n.v) has three.
+    // n.v, n.l and v.h are 10^-4, computed from components of 1: a rounding of 2^-24 is 6e-4 of them, and G/(n.v)
+    // has three of them.
     let because = "10^4 F k L, n.v at its floor: three cosines of 1e-4 from components of 1 in f32";
     Outcome::number(expected, middle(&mut world), expected * 2e-3, because)
 }
@@ -175,7 +176,7 @@ fn the_strongest_inverse_square_light_in_the_surface() -> Outcome {
         ..Light::point(Vec3::splat(9.9e25))
     };
     world.spawn((light, Transform::IDENTITY));
-    // k_a L_a at the floor of a centimetre, where there is no direction.
+    // k_a L_a at the minimum distance of a centimetre, where there is no direction.
     Outcome::number(9.9e29, middle(&mut world), 1e24, "k_a L_a 10^4 at the light: the largest that is taken")
 }
 
@@ -236,7 +237,7 @@ fn infinite_normals() -> Outcome {
             world.entity_mut(entity).insert(Mesh(Arc::new(mesh.clone())));
             world.spawn(sun(1.0, true));
             let pixel = draw(&mut world, 9, 9, &FrameOptions { shading: Some(shading), ..linear() }).0[40];
-            // A huge one is a direction all the same.
+            // A huge normal still has a direction.
             let cosine = if normal.is_finite() { 1.0 / 3f64.sqrt() } else { 0.0 };
             pairs.push((0.5 + 0.5 * cosine, grey(pixel)));
         }
@@ -271,7 +272,7 @@ fn optical_constants_of_no_numbers() -> Outcome {
             });
             world.spawn(sun(1.0, true));
             let got = middle(&mut world);
-            // Whatever stands in for the constant, what is reflected is between nothing and all: D = G = 1, n.v = 1.
+            // Whatever replaces the constant, the reflected fraction is between 0 and 1: D = G = 1, n.v = 1.
             pairs.push((got.clamp(0.0, 1.0), got));
         }
     }
@@ -297,7 +298,8 @@ fn an_exponent_of_no_number() -> Outcome {
                     ..SceneSettings::default()
                 });
                 world.spawn(sun(1.0, true));
-                // Light, viewer and normal are one: the peak, which no exponent changes (F = 0.04 for Torrance-Sparrow).
+                // Light, viewer and normal coincide: the peak, which is the same for every exponent (F = 0.04 for
+                // Torrance-Sparrow).
                 let peak = if *model == ReflectionModel::TorranceSparrow { 0.04 } else { 1.0 };
                 (peak, middle(&mut world))
             })

@@ -1,4 +1,4 @@
-//! Cases of places and transforms: far away, mirrored, flattened, turned inside out.
+//! Cases of positions and transforms: far away, mirrored, flattened, turned inside out.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ fn grey(color: DVec3) -> f64 {
     color.element_sum() / 3.0
 }
 
-/// A pane under a point light, at `at`, seen from 2 m.
+/// A pane at `at` under a point light, seen from 2 m.
 fn lit_pane(at: DVec3) -> Vec<f64> {
     let mut world = World::new();
     world.spawn((Mesh(Arc::new(pane())), Material::matt(Vec3::ONE), Transform::from_translation(at)));
@@ -39,8 +39,8 @@ fn lit_pane(at: DVec3) -> Vec<f64> {
 fn moved(at: DVec3) -> Outcome {
     let near = lit_pane(DVec3::ZERO);
     let far = lit_pane(at);
-    // Positions are f64 until the camera is subtracted: what is left is their rounding at 10^7 m, 2e-9 m, and frame space's
-    // own, 1e-7 of a metre or two, in a light that changes by about 2 per metre.
+    // Positions are f64 until the camera is subtracted. What remains is their rounding at 10^7 m, 2e-9 m, and that
+    // of camera-relative space, 1e-7 of a metre or two, in a light that changes by about 2 per metre.
     Outcome::worst(near.into_iter().zip(far), 1e-6, "camera-relative in f64: 2 per metre times 2e-7 m")
 }
 
@@ -52,7 +52,7 @@ fn ten_thousand_kilometres_away() -> Outcome {
     moved(DVec3::new(-1e7, 3e6, 1e7))
 }
 
-/// The middle pixel of a shape under a light from the upper right, seen along -z by a parallel camera.
+/// Returns the middle pixel of a shape under a light from the upper right, seen along -z by an orthographic camera.
 fn parallel(mesh: lumbre_mesh::TriangleMesh, scale: DVec3, at: DVec3) -> f64 {
     let mut world = World::new();
     let place = Transform { scale, ..Transform::IDENTITY };
@@ -75,7 +75,7 @@ fn a_scale_of_zero_is_not_seen() -> Outcome {
     Outcome::number(0.0, got, 0.0, "no area: the background")
 }
 
-/// Where x = y = 0.4 on the ellipsoid with half axes (2, 1, 0.5), the normal is the gradient (x/4, y, 4 z).
+/// At x = y = 0.4 on the ellipsoid with half axes (2, 1, 0.5), the normal is the gradient (x/4, y, 4 z).
 fn ellipsoid(sign: f64) -> Outcome {
     let (x, y) = (0.4f64, 0.4f64);
     let z = 0.5 * (1.0 - x * x / 4.0 - y * y).sqrt();
@@ -83,7 +83,7 @@ fn ellipsoid(sign: f64) -> Outcome {
     let expected = normal.dot(DVec3::ONE.normalize());
     let got =
         parallel(shapes::uv_sphere(1.0, 512, 256), DVec3::new(sign * 2.0, 1.0, 0.5), DVec3::new(x, y, 0.0));
-    // Interpolated normals between vertices 0.012 apart: second order, 0.012^2 / 8 times the axes' ratio of 4.
+    // Normals are interpolated between vertices 0.012 apart: second order, 0.012^2 / 8 times the axes' ratio of 4.
     Outcome::number(expected, got, 2e-4, "the cofactor matrix; normals interpolated over 0.7 degrees")
 }
 

@@ -1,4 +1,4 @@
-//! The probe itself: that it finds what is put in, by pass and pixel, and that no frame of a test goes past it.
+//! The probe itself: it finds injected values, by pass and pixel, and no frame of a test is drawn without it.
 
 use std::path::Path;
 
@@ -16,7 +16,8 @@ crate::cases! {
     }
 }
 
-/// What the probe says of a frame over which an overlay writes this WGSL expression at (5, 3) and 0.5 elsewhere.
+/// Returns what the probe reports for a frame over which an overlay writes this WGSL expression at (5, 3) and 0.5
+/// elsewhere.
 fn probed(value: &str, options: &FrameOptions) -> String {
     let gpu = gpu();
     let frame = Offscreen::new(gpu, 16, 16, OffscreenFormat::LinearFloat).unwrap();
@@ -96,8 +97,10 @@ fn a_clean_overlay_is_not() -> Outcome {
     Outcome::text("nothing, probed: true", probed("f32(one)", &linear()))
 }
 
-/// `adapter.rs` draws with the probe on whatever it is asked, and fails on a find; here it is checked that nothing else draws, but for files that have to make
-/// renderers of their own: they inject values, lose devices, add effects, compare renderers of other pasts, or frames that have no linear frame to look into, or (the shadows') switch the probe on themselves.
+/// `adapter.rs` always draws with the probe on and fails if it finds anything. This checks that nothing else draws,
+/// except for files that need their own renderers: they inject values, lose devices, add effects, compare renderers
+/// with different histories, draw frames without a linear frame to inspect, or (the shadows') switch the probe on
+/// themselves.
 fn no_frame_of_a_test_goes_past_the_probe() -> Outcome {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut past = Vec::new();

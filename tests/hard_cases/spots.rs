@@ -1,4 +1,5 @@
-//! Cases of spotlights in whole frames, against the closed form at every pixel; and what is said of cones between vertices.
+//! Cases of spotlights in whole frames, compared with the closed form at every pixel; and the warnings about cones
+//! between vertices.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
@@ -19,15 +20,16 @@ crate::cases! {
 }
 
 const SIZE: usize = 33;
-/// A rounding of f32.
+/// One rounding of f32.
 const U: f64 = 5.960_464_477_539_063e-8;
 
 fn spot(cone: SpotCone) -> Light {
     Light { attenuation: Attenuation::NONE, ..Light::spot(Vec3::ONE, cone) }
 }
 
-/// Every pixel of the pane against f64, for a lamp that ends up at `place` and shines along `axis`. Pixels within a rounding of the
-/// cone's edge, where either side is right, are left out; a smooth edge has none.
+/// Compares every pixel of the pane with f64, for a lamp that ends up at `place` and shines along `axis`. Pixels
+/// within a rounding of the cone's edge, where either side is correct, are left out; a smooth edge has none of
+/// them.
 fn against_closed_form(
     world: &mut World,
     light: &Light,
@@ -89,7 +91,7 @@ fn a_frame_of_cutoff_180_turned_away() -> Outcome {
 
 fn a_frame_of_a_hard_edge() -> Outcome {
     let cone = SpotCone::Smooth { inner: 0.4, outer: 0.4 };
-    // A cosine is off by 12 u, over a width of .001, and a square doubles that.
+    // A cosine is off by 12 u, over a width of .001, and the square doubles that.
     frame_of(
         cone,
         DVec3::new(0.0, 0.1, 0.0),
@@ -126,7 +128,8 @@ fn a_light_under_a_node_of_scale_zero() -> Outcome {
 fn a_light_under_a_flattened_parent() -> Outcome {
     let mut world = dark_pane();
     let light = spot(SpotCone::Exponent { cutoff: 0.9, exponent: 1.0 });
-    // Flattened across, the parent keeps the part of the axis that lies in its plane: along its own x, which looks at the pane.
+    // Flattened along z, the parent keeps the part of the axis in its xy plane: along its own x, which points at
+    // the pane.
     let parent = Transform::from_xyz(0.0, 0.0, 1.0)
         .with_rotation(glam::DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2))
         .with_scale(DVec3::new(1.0, 1.0, 0.0));
@@ -135,7 +138,7 @@ fn a_light_under_a_flattened_parent() -> Outcome {
     let child = world.spawn((light.clone(), Transform::from_rotation(turn), ChildOf(parent))).id();
     draw(&mut world, 1, 1, &linear());
     let axis = world.get::<lumbre_scene::GlobalTransform>(child).unwrap().forward();
-    // From the parent: x of its space is -z of the world; what was left of (sin .9, 0, -cos .9) is its first component.
+    // The parent's x is -z of the world, and what remains of (sin .9, 0, -cos .9) is its first component.
     assert!((axis - DVec3::NEG_Z).length() < 1e-12, "{axis}");
     against_closed_form(
         &mut world,

@@ -1,4 +1,4 @@
-//! A table of hard cases, and its part of docs/hard-cases.md. Not the cases.
+//! A table of hard cases, and its part of docs/hard-cases.md. The cases themselves are in the other modules.
 
 #![allow(clippy::print_stdout, reason = "the table is what the test is for")]
 
@@ -19,7 +19,7 @@ fn page() -> std::path::PathBuf {
     root.expect("the workspace has a lock file").join("docs/hard-cases.md")
 }
 
-/// The page's parts: each begins with a line "# heading".
+/// Returns the page's parts, each of which begins with a line "# heading".
 fn parts(page: &str) -> Vec<String> {
     let mut parts: Vec<String> = Vec::new();
     for line in page.lines() {
@@ -38,7 +38,7 @@ fn shown(name: &str) -> String {
 }
 
 impl Table {
-    /// Every case belongs to a row, and every row has a case.
+    /// Checks that every case belongs to a row and every row has a case.
     pub fn new(
         heading: &'static str,
         rows: &'static [(&'static str, &'static str)],
@@ -54,7 +54,7 @@ impl Table {
         Self { heading, rows, cases }
     }
 
-    /// Runs all and prints them. With LUMBRE_WRITE_TABLES=1 they become their part of the page too.
+    /// Runs all cases and prints them. With LUMBRE_WRITE_TABLES=1 they are also written to their part of the page.
     pub fn print(&self, command: &str, about: &str) {
         let mut text = format!(
             "# {}\n\n`LUMBRE_WRITE_TABLES=1 {command}` prints this part and writes it; each case is a test of its own too. {} cases{about}\n",
@@ -77,7 +77,7 @@ impl Table {
         if std::env::var_os("LUMBRE_WRITE_TABLES").is_some() {
             let old = std::fs::read_to_string(page()).unwrap_or_default();
             let mut parts = parts(&old);
-            // Between parts stands an empty line.
+            // Parts are separated by an empty line.
             parts.iter_mut().for_each(|part| part.truncate(part.trim_end().len()));
             let first = format!("# {}", self.heading);
             match parts.iter_mut().find(|part| part.lines().next() == Some(&first)) {
@@ -88,7 +88,7 @@ impl Table {
         }
     }
 
-    /// The page has these rows with these cases, and no others.
+    /// Checks that the page has exactly these rows and cases.
     pub fn in_step(&self) {
         let page = std::fs::read_to_string(page()).expect("the page is there");
         let first = format!("# {}", self.heading);

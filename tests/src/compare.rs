@@ -1,26 +1,26 @@
-//! Comparison of frames: how far two are apart. Not how far they may be: each test states its bound and the reason.
+//! Comparison of frames: how much two differ. How much they may differ is stated in each test, with the reason.
 
 use glam::DVec3;
 
-/// How far two frames are apart, over the pixels that both have.
+/// How much two frames differ, over the pixels that both have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// Largest difference of any channel. NaN counts as infinite.
     pub largest: f64,
-    /// Index of the pixel where it is.
+    /// Index of the pixel with the largest difference.
     pub pixel: usize,
     /// |a - b| / |b| over all channels.
     pub relative_l2: f64,
     /// Mean absolute difference of the channels.
     pub mean: f64,
-    /// Pixels compared.
+    /// Number of pixels compared.
     pub pixels: usize,
 }
 
 /// Compares `got` with `expected`; pixels that are `None` in either are left out.
 ///
 /// # Panics
-/// If the frames differ in size: a comparison of different pictures is no comparison.
+/// If the frames differ in size.
 pub fn compare(got: &[Option<DVec3>], expected: &[Option<DVec3>]) -> Difference {
     assert_eq!(got.len(), expected.len(), "frames of different sizes");
     let mut result = Difference { largest: 0.0, pixel: 0, relative_l2: 0.0, mean: 0.0, pixels: 0 };

@@ -1,8 +1,8 @@
-//! A lighting function run on the GPU over a buffer of inputs: a compute kernel around one call. Not a judge of what comes out: that
-//! is the caller's twin, with `running_error` for the bound.
+//! Runs a lighting function on the GPU over a buffer of inputs, with a compute kernel around one call. The results
+//! are checked by the caller, against the f64 twin and with `running_error` for the bound.
 //!
-//! Inputs and results cross as bits, so that neither compiler nor driver may assume that no NaN comes by, and results that were
-//! never written are told from those that were.
+//! Inputs and results are passed as bits, so that neither compiler nor driver can assume that there are no NaNs,
+//! and results that were never written can be distinguished from those that were.
 //!
 //! ```
 //! use lumbre_tests::kernel::{Kernel, Type};
@@ -19,14 +19,14 @@ use std::path::Path;
 use lumbre_render::Gpu;
 use lumbre_shaders::{Kept, Program, UnnamedFeatures};
 
-/// Invocations of a workgroup, and the most workgroups that every device takes in a row.
+/// Invocations of a workgroup, and the largest number of workgroups in one dimension that every device supports.
 const WORKGROUP: usize = 64;
 const WORKGROUPS: usize = 65_535;
 
-/// What the result buffer holds before: a NaN with a payload that no arithmetic makes.
+/// Initial content of the result buffer: a NaN with a payload that no arithmetic produces.
 const UNWRITTEN: u32 = 0x7fc0_dead;
 
-/// A kind of argument or result.
+/// The type of an argument or result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Type {
     /// `f32`.
@@ -35,12 +35,12 @@ pub enum Type {
     Vector,
     /// `vec4<f32>`.
     Vector4,
-    /// `bool`: given and taken as 0 or 1.
+    /// `bool`, passed as 0 or 1.
     Flag,
 }
 
 impl Type {
-    /// How many numbers of a buffer it takes.
+    /// Returns how many numbers of a buffer it occupies.
     pub fn size(self) -> usize {
         match self {
             Self::Number | Self::Flag => 1,
@@ -49,7 +49,7 @@ impl Type {
         }
     }
 
-    /// The argument that starts at a place of `x`.
+    /// Returns the WGSL expression that reads an argument starting at an index of `x`.
     fn read(self, at: usize) -> String {
         match self {
             Self::Number => format!("x[{at}]"),
@@ -59,7 +59,7 @@ impl Type {
         }
     }
 
-    /// The numbers of a result called `r`.
+    /// Returns the WGSL expressions of the numbers of a result called `r`.
     fn write(self) -> &'static str {
         match self {
             Self::Number => "r",
@@ -70,12 +70,12 @@ impl Type {
     }
 }
 
-/// One function of `shaders/optics` as a compute kernel.
+/// A compute kernel around one function of `shaders/optics`.
 #[derive(Clone, Debug)]
 pub struct Kernel {
-    /// The whole program after imports and conditions, with `evaluate` as the call.
+    /// The whole program after resolving imports and conditions, with `evaluate` as the call.
     pub wgsl: String,
-    /// The program before imports and conditions.
+    /// The program before resolving imports and conditions.
     source: String,
     features: Vec<String>,
     inputs: usize,
@@ -83,7 +83,8 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// A kernel around a `function` of the module `optics::module`, with arguments of these types one behind the other.
+    /// Creates a kernel around a `function` of the module `optics::module` with arguments of these types, one after
+    /// the other.
     ///
     /// # Panics
     /// As [`Kernel::new`].
@@ -101,11 +102,12 @@ impl Kernel {
         Self::new(module, &[function], features, size, outputs, &call)
     }
 
-    /// A kernel around a `call`: WESL statements that return an `array<f32, outputs>` from the numbers of `x`, an `array<f32, inputs>`.
-    /// It knows the `imports` of the module `optics::module`, compiled with these `features` on and all others off.
+    /// Creates a kernel around a `call`: WESL statements that return an `array<f32, outputs>` computed from `x`, an
+    /// `array<f32, inputs>`. They can use the `imports` of the module `optics::module`, compiled with these
+    /// `features` on and all others off.
     ///
     /// # Panics
-    /// If it does not compile: the test that asks is wrong.
+    /// If it does not compile: the test itself is wrong.
     pub fn new(
         module: &str,
         imports: &[&str],
@@ -138,10 +140,11 @@ impl Kernel {
         Self { wgsl, source, features, inputs, outputs }
     }
 
-    /// The same kernel over a changed shader: in the module `optics::module`, `from` becomes `to`. For tests of the tests.
+    /// Returns the same kernel with a changed shader: in the module `optics::module`, `from` is replaced by `to`.
+    /// For tests of the tests.
     ///
     /// # Panics
-    /// If the module has no `from`, or does not compile any more.
+    /// If the module does not contain `from`, or does not compile any more.
     pub fn mutated(&self, module: &str, from: &str, to: &str) -> Self {
         let wgsl = compile(&self.source, &self.features, |name, text| {
             if name != module {
@@ -153,20 +156,20 @@ impl Kernel {
         Self { wgsl, ..self.clone() }
     }
 
-    /// How many numbers an input has.
+    /// Number of numbers in one input.
     pub fn inputs(&self) -> usize {
         self.inputs
     }
 
-    /// How many numbers a result has.
+    /// Number of numbers in one result.
     pub fn outputs(&self) -> usize {
         self.outputs
     }
 
-    /// The function over many inputs, `inputs` numbers each; `outputs` numbers come back for each.
+    /// Evaluates the function for many inputs of `inputs` numbers each. Returns `outputs` numbers for each.
     ///
     /// # Panics
-    /// If the device refuses, or leaves a result unwritten: a test that cannot run has failed.
+    /// If the device fails or leaves a result unwritten.
     pub fn run(&self, gpu: &Gpu, input: &[f32]) -> Vec<f32> {
         assert_eq!(input.len() % self.inputs, 0, "inputs come in groups of {}", self.inputs);
         let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -233,7 +236,7 @@ impl Kernel {
     }
 }
 
-/// The program with the modules of `shaders/optics`, each as `edit` gives it by name and text.
+/// Compiles the program with the modules of `shaders/optics`, each as `edit` returns it for its name and text.
 fn compile(source: &str, features: &[String], edit: impl Fn(&str, String) -> String) -> String {
     let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders/optics");
     let files = std::fs::read_dir(&shaders).unwrap_or_else(|error| panic!("{shaders:?}: {error}"));
@@ -282,7 +285,7 @@ mod tests {
         let call = "return array<f32, 1>(lambert(vec3<f32>(x[0]), vec3<f32>(1.0, 0.0, 0.0)));";
         let kernel = Kernel::new("lambert", &["lambert"], &[], 1, 1, call);
         let count = WORKGROUP * WORKGROUPS + 1000;
-        // Multiples of 2⁻²³ up to 1/2 are f32 and pass unrounded.
+        // Multiples of 2⁻²³ up to 1/2 are exact in f32 and pass unrounded.
         let input: Vec<f32> = (0..count).map(|i| i as f32 / (1 << 23) as f32).collect();
         assert_eq!(kernel.run(&gpu(), &input), input);
     }

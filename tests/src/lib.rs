@@ -1,4 +1,5 @@
-//! What the frame tests share: the f64 twin of a frame, comparisons with their verdicts, and small scenes. No tests are in here.
+//! What the frame tests share: the f64 twin of a frame, comparisons and their bounds, and small scenes. This
+//! crate's library contains no frame tests itself.
 //!
 //! ```text
 //!    World ──► lumbre_render (GPU, f32) ──► frame ─┐

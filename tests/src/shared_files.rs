@@ -1,8 +1,8 @@
-//! Models and reference data that lie beside the checkout, where there are any. They are not part of the project.
+//! Models and reference data beside the checkout, if there are any. They are not part of the project.
 
 use std::path::PathBuf;
 
-/// The path of a shared file, or `None`, said aloud, if it is not there.
+/// Returns the path of a shared file, or `None`, with a message, if it does not exist.
 pub fn shared_file(name: &str) -> Option<PathBuf> {
     let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared")).join(name);
     if path.exists() {

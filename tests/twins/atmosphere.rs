@@ -1,4 +1,4 @@
-//! Fog of the four kinds.
+//! Twins of the four kinds of fog.
 
 use lumbre_optics::*;
 use lumbre_tests::kernel::{Kernel, Type};
@@ -64,7 +64,7 @@ fn depth_cue(twin: Twin) -> Twin {
         .corners(hard_cues())
 }
 
-/// `fog_weight` under one feature, with the parameters where `FogMode::parameters` puts them.
+/// `fog_weight` under one feature, with the parameters in the order of `FogMode::parameters`.
 fn weight(mode: &FogMode, inputs: usize, parameters: &str) -> Twin {
     let call = format!("return array<f32, 1>(fog_weight({parameters}, x[{}]));", inputs - 1);
     let kernel = Kernel::new("fog", &["fog_weight"], &[mode.shader_feature()], inputs, 1, &call);
@@ -77,7 +77,7 @@ pub fn twins() -> Vec<Twin> {
     vec![
         linear(Twin::new("fog", "fog_linear", &[], &number[..3], Type::Number)),
         linear(weight(&FogMode::Linear { start, end }, 3, "vec4<f32>(x[0], x[1], 0.0, 0.0)")),
-        // The fraction itself is the rest of the linear weight; its bound is a rounding less.
+        // The fraction is 1 minus the linear weight; its bound is one rounding smaller.
         Twin::new("fog", "fog_fraction", &[], &number[..3], Type::Number)
             .expect(|x| fog_fraction(x[0], x[1], x[2]))
             .within(|x| atmosphere::fog_fraction(x[0], x[1], x[2]))

@@ -1,8 +1,8 @@
-//! No lighting function goes without a twin in the table unnoticed.
+//! Checks that every lighting function has a twin in the table.
 
 use std::collections::BTreeSet;
 
-/// Functions that the table has under another's name, or not at all, and why.
+/// Functions that are in the table under another name or not at all, and why.
 const ELSEWHERE: &[(&str, &str)] = &[
     ("fresnel_conductor_channel", "three times in fresnel_conductor"),
     ("fresnel_normal_reflectance_channel", "three times in fresnel_normal_reflectance"),
@@ -30,7 +30,7 @@ fn every_function_of_the_shaders_is_in_the_table() {
         functions.extend(names.map(str::to_owned));
     }
     assert!(functions.len() >= 50, "only {} functions were found", functions.len());
-    // Names have a case in brackets behind them.
+    // A name may be followed by a case in brackets.
     let in_table: BTreeSet<&str> =
         crate::all().iter().map(|twin| twin.name.split(' ').next().unwrap_or_default()).collect();
     let missing: Vec<&String> = functions

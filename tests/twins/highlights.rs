@@ -1,4 +1,4 @@
-//! Highlights: powers of cosines, Phong's and Blinn's lobes, their filtered forms, roughness.
+//! Highlights: powers of cosines, the lobes of Phong and Blinn, their filtered forms, and roughness.
 
 use glam::{DVec3, Vec3};
 use lumbre_optics::*;
@@ -13,7 +13,7 @@ use crate::vectors::vector;
 
 const LOBE: [Type; 4] = [Type::Vector, Type::Vector, Type::Vector, Type::Number];
 
-/// Directions and an exponent.
+/// Random directions and an exponent.
 pub fn lobe(sequence: &mut Sequence) -> Vec<f32> {
     let directions = sequence.directions();
     let mut numbers: Vec<f32> = directions.iter().flat_map(|v| v.to_array()).collect();
@@ -21,14 +21,14 @@ pub fn lobe(sequence: &mut Sequence) -> Vec<f32> {
     numbers
 }
 
-/// Hard directions with each exponent.
+/// Hard directions, each with every exponent.
 pub fn hard_lobes() -> Vec<Vec<f32>> {
     let directions: Vec<Vec<f32>> = hard_directions().iter().map(|numbers| numbers.to_vec()).collect();
     crossed(&directions, &product(&[&EXPONENTS]))
 }
 
 fn base_and_exponent(sequence: &mut Sequence) -> Vec<f32> {
-    // Half of them where the power is neither 0 nor 1.
+    // For half of them the power is neither 0 nor 1.
     let exponent = sequence.shininess();
     let base =
         if sequence.next() < 0.5 { sequence.next() } else { (-sequence.decades(-3.0, 1.0) / exponent).exp() };
@@ -68,7 +68,7 @@ fn powers_of_cosines() -> [Twin; 3] {
     ]
 }
 
-/// One cosine lobe, around exact vectors, that is random near its peak.
+/// A cosine lobe around exact vectors, with random inputs near its peak.
 fn bare_lobe(sharp: bool) -> Twin {
     let arguments = [Type::Vector, Type::Vector, Type::Number];
     let corners: Vec<Vec<f32>> = hard_directions().iter().map(|numbers| numbers[3..].to_vec()).collect();
@@ -99,7 +99,7 @@ fn suffix(sharp: bool) -> &'static str {
     if sharp { "sharp" } else { "plain" }
 }
 
-/// The plain form is for exponents up to [`SHARP_SHININESS`].
+/// The plain form is only used for exponents up to [`SHARP_SHININESS`].
 fn plain(exponent: f32, sharp: bool) -> f32 {
     if sharp || exponent <= SHARP_SHININESS { exponent } else { exponent.rem_euclid(SHARP_SHININESS) }
 }
@@ -194,19 +194,19 @@ pub fn twins() -> Vec<Twin> {
             ("normalized_phong", normalized_phong as Model, lobes::normalized_phong as Bound),
             ("normalized_blinn_phong", blinn.0, blinn.1),
         ] {
-            // At most the constant of the largest exponent.
+            // The results are at most the constant of the largest exponent.
             all.push(highlight(module, name, model, bound, sharp).range_up_to(0.0, 500_001.0, 1e6));
         }
     }
     all
 }
 
-/// Some vectors of an input.
+/// Returns the first three vectors of an input.
 pub fn directions(x: &[f64]) -> [DVec3; 3] {
     [vector(x, 0), vector(x, 3), vector(x, 6)]
 }
 
-/// The first three numbers as an f32 vector.
+/// Returns the first three numbers as an f32 vector.
 pub fn leading(x: &[f32]) -> Vec3 {
     Vec3::from_slice(&x[..3])
 }

@@ -1,11 +1,11 @@
-//! Inputs of the functions under test: random ones as scenes have them, and hard ones at their corners. Fixed sequences, so that a
-//! failure comes back.
+//! Inputs of the functions under test: random ones like those of scenes, and hard ones at their corners. The
+//! sequences are fixed, so that a failure can be repeated.
 
 use glam::{DVec3, Vec3};
 
-/// Random inputs per function.
+/// Number of random inputs per function.
 pub const RANDOM: usize = 1_000_000;
-/// Hard inputs per function, at least.
+/// Minimum number of hard inputs per function.
 pub const HARD: usize = 100_000;
 
 /// A fixed sequence of numbers in [0, 1): splitmix64 of a counter.
@@ -28,7 +28,7 @@ impl Sequence {
         low + (high - low) * self.next()
     }
 
-    /// Even in the logarithm: every decade from 10^low to 10^high alike.
+    /// Uniform in the logarithm: every decade from 10^low to 10^high is equally likely.
     pub fn decades(&mut self, low: f32, high: f32) -> f32 {
         10f32.powf(self.between(low, high))
     }
@@ -40,7 +40,8 @@ impl Sequence {
         DVec3::new(radius * cosine, z, radius * sine).as_vec3()
     }
 
-    /// A normal, a light mostly in front of it, and a viewer: half of them near the mirror direction, at every distance from it.
+    /// Returns a normal, a light mostly in front of it, and a viewer. Half of the viewers are near the mirror
+    /// direction, at distances of every magnitude from it.
     pub fn directions(&mut self) -> [Vec3; 3] {
         let (normal, mut light) = (self.unit(), self.unit());
         if normal.dot(light) < 0.0 && self.next() < 0.8 {
@@ -57,13 +58,13 @@ impl Sequence {
         [normal, light, viewer]
     }
 
-    /// From 1 to a million, some of them whole.
+    /// Returns an exponent from 1 to a million; some are whole numbers.
     pub fn shininess(&mut self) -> f32 {
         let exponent = self.decades(0.0, 6.0);
         if self.next() < 0.2 { exponent.round() } else { exponent }
     }
 
-    /// Any finite number, bit pattern by bit pattern.
+    /// Returns any finite number, all bit patterns being equally likely.
     pub fn any(&mut self) -> f32 {
         loop {
             let number = f32::from_bits(self.bits() as u32);
@@ -74,10 +75,10 @@ impl Sequence {
     }
 }
 
-/// Exponents at which something changes.
+/// Exponents at which the behaviour changes.
 pub const EXPONENTS: [f32; 11] = [0.0, 1e-3, 0.5, 1.0, 3.0, 128.0, 256.0, 257.0, 1e4, 9.99e5, 1e6];
 
-/// Normal, light and viewer: none, opposite, equal, grazing, mirrored.
+/// Normals, lights and viewers that are zero, opposite, equal, grazing or mirrored.
 pub fn hard_directions() -> Vec<[f32; 9]> {
     let grazing = |height: f64| DVec3::new(1.0, height, 0.0).normalize().as_vec3();
     let mut sequence = Sequence(11);
@@ -124,7 +125,7 @@ pub fn hard_directions() -> Vec<[f32; 9]> {
     all
 }
 
-/// Every combination of one number of each list.
+/// Returns every combination of one number from each list.
 pub fn product(lists: &[&[f32]]) -> Vec<Vec<f32>> {
     lists.iter().fold(vec![Vec::new()], |sofar, list| {
         let extended = sofar.iter().flat_map(|head| {
@@ -134,12 +135,13 @@ pub fn product(lists: &[&[f32]]) -> Vec<Vec<f32>> {
     })
 }
 
-/// Each of `heads` with each of `tails`.
+/// Returns each of `heads` combined with each of `tails`.
 pub fn crossed(heads: &[Vec<f32>], tails: &[Vec<f32>]) -> Vec<Vec<f32>> {
     heads.iter().flat_map(|head| tails.iter().map(move |tail| [head.as_slice(), tail].concat())).collect()
 }
 
-/// The corners themselves, and around them what is up to three units in the last place away, until there are enough.
+/// Returns the corners themselves, and random neighbours up to three units in the last place away until there are
+/// enough.
 pub fn jittered(corners: &[Vec<f32>]) -> Vec<f32> {
     let mut sequence = Sequence(13);
     assert!(!corners.is_empty(), "there are no hard inputs");
@@ -157,7 +159,7 @@ pub fn jittered(corners: &[Vec<f32>]) -> Vec<f32> {
     all
 }
 
-/// So many representable numbers further on.
+/// Returns the representable number this many steps further.
 fn stepped(number: f32, steps: i32) -> f32 {
     let ordered = |x: f32| {
         let bits = x.to_bits() as i32;

@@ -1,4 +1,4 @@
-//! One function on the GPU against its f64 twin: how far apart, and how far it may be.
+//! Compares one function on the GPU with its f64 twin: how much they differ, and how much they may.
 
 use std::sync::Arc;
 
@@ -11,15 +11,15 @@ use crate::bounds::{Allowed, Numbers};
 use crate::inputs::{RANDOM, Sequence, jittered};
 use crate::verdict::{Part, Verdict, unit_in_the_last_place};
 
-/// Of so many inputs one is checked against the running error of the shader too, which takes longer.
+/// One of this many inputs is also checked against the running error of the shader, which takes longer.
 const MACHINE_CHECKED: usize = 64;
-/// Random inputs are made in pieces of this many, each with its own sequence.
+/// Random inputs are made in pieces of this size, each with its own sequence.
 const PIECE: usize = 10_000;
-/// Random inputs that may lie within rounding of a condition, of a million.
+/// How many of a million random inputs may be within rounding of a condition.
 const MOST_OPEN: usize = 2_000;
-/// Inputs of any size.
+/// Number of inputs of any size.
 const WILD: usize = 100_000;
-/// Numbers at which things overflow, underflow or vanish.
+/// Numbers at which results overflow, underflow or vanish.
 const EXTREMES: [f32; 12] = [
     0.0,
     -0.0,
@@ -49,19 +49,19 @@ pub struct Twin {
     allowed: Function<Allowed>,
     random: Arc<Maker>,
     corners: Vec<Vec<f32>>,
-    /// Where results lie, and the largest component of an input for which they do.
+    /// The range of the results, and the largest component of an input for which it holds.
     range: Option<(f64, f64, f32)>,
-    /// Whether the running error of the shader is asked too.
+    /// Whether results are also checked against the running error of the shader.
     machine_checked: bool,
 }
 
 impl Twin {
-    /// A function of `module` by its own name.
+    /// Creates the twin of a function of `module` with its own name.
     pub fn new(module: &str, function: &str, features: &[&str], arguments: &[Type], result: Type) -> Self {
         Self::around(function, Kernel::of(module, function, features, arguments, result))
     }
 
-    /// A function as a kernel calls it.
+    /// Creates the twin of a function that a given kernel calls.
     pub fn around(name: &str, kernel: Kernel) -> Self {
         Self {
             name: name.to_owned(),
@@ -75,55 +75,56 @@ impl Twin {
         }
     }
 
-    /// One of several cases of a function.
+    /// Marks this as one of several cases of a function.
     pub fn named(mut self, suffix: &str) -> Self {
         self.name = format!("{} ({suffix})", self.name);
         self
     }
 
-    /// The f64 twin.
+    /// Sets the f64 twin.
     pub fn expect<T: Results>(mut self, twin: impl Fn(&[f64]) -> T + Send + Sync + 'static) -> Self {
         self.expected = Arc::new(move |x| twin(x).numbers());
         self
     }
 
-    /// The bound that the twin's documentation states.
+    /// Sets the bound that the twin's documentation states.
     pub fn within<T: Into<Allowed>>(mut self, bound: impl Fn(&[f64]) -> T + Send + Sync + 'static) -> Self {
         self.allowed = Arc::new(move |x| bound(x).into());
         self
     }
 
-    /// How a random input is made.
+    /// Sets how a random input is made.
     pub fn random(mut self, input: impl Fn(&mut Sequence) -> Vec<f32> + Send + Sync + 'static) -> Self {
         self.random = Arc::new(input);
         self
     }
 
-    /// The hard inputs.
+    /// Sets the hard inputs.
     pub fn corners(mut self, corners: Vec<Vec<f32>>) -> Self {
         self.corners = corners;
         self
     }
 
-    /// Where results lie for every finite input.
+    /// Sets the range of the results for every finite input.
     pub fn range(self, low: f64, high: f64) -> Self {
         self.range_up_to(low, high, f32::MAX)
     }
 
-    /// Where results lie for inputs up to that size: those of directions, whose products overflow beyond it.
+    /// Sets the range of the results for inputs up to a size, for functions of directions, whose products overflow
+    /// beyond it.
     pub fn range_up_to(mut self, low: f64, high: f64, largest: f32) -> Self {
         self.range = Some((low, high, largest));
         self
     }
 
-    /// The same twin for another shader, judged by the stated bound alone.
+    /// The same twin for a changed shader, checked against the stated bound alone.
     pub fn mutated(&self, module: &str, from: &str, to: &str) -> Self {
         let kernel = self.kernel.mutated(module, from, to);
         let name = format!("{}: {from:?} -> {to:?}", self.name);
         Self { kernel, name, machine_checked: false, ..self.clone() }
     }
 
-    /// What the twin gives and how far the device may be off, for one input.
+    /// Returns the twin's results and how much the device may differ, for one input.
     pub fn asked(&self, x: &[f32]) -> (Numbers, Allowed) {
         let numbers: Numbers = x.iter().map(|x| f64::from(*x)).collect();
         ((self.expected)(&numbers), (self.allowed)(&numbers))
@@ -142,7 +143,7 @@ impl Twin {
         all
     }
 
-    /// Runs everything and compares.
+    /// Runs all inputs and compares.
     pub fn judge(&self, gpu: &Gpu) -> Verdict {
         self.judge_some(gpu, RANDOM)
     }
@@ -162,7 +163,8 @@ impl Twin {
         verdict
     }
 
-    /// How many inputs of any size give what is not finite or out of range, and one of them.
+    /// Returns how many inputs of any size give results that are not finite or out of range, and one of these
+    /// inputs.
     fn wild(&self, gpu: &Gpu) -> (usize, Vec<f32>) {
         let Some((low, high, largest)) = self.range else { return (0, Vec::new()) };
         let mut sequence = Sequence(19);
@@ -188,7 +190,7 @@ impl Twin {
         (strange.len(), first.unwrap_or_default())
     }
 
-    /// Compares on given inputs.
+    /// Compares results for given inputs.
     pub fn compare(&self, input: &[f32], gpu: &Gpu) -> Part {
         let got = self.kernel.run(gpu, input);
         let program = self.machine_checked.then(|| Program::new(&self.kernel.wgsl));
@@ -231,7 +233,7 @@ impl Twin {
         if let Some(program) = machine {
             let bounds = program.bounds(x);
             for (at, (result, got)) in bounds.results.iter().zip(got).enumerate() {
-                // The program's own exact value: nothing of the twin. The interpreter's f64 rounds as well.
+                // The program's own exact value, independent of the twin. The interpreter's f64 is rounded too.
                 let own = 1e-13 * result.value.abs().max(1e-20);
                 part.machine =
                     part.machine.max(ratio((f64::from(*got) - result.value).abs(), result.error + own));
@@ -246,14 +248,14 @@ impl Twin {
     }
 }
 
-/// One side of a condition.
+/// The comparison with the results on one side of a condition.
 struct Side {
     absolute: f64,
     ulp: f64,
     ratio: f64,
 }
 
-/// Results under this have units in the last place that say nothing: their absolute error does.
+/// Below this, errors in units in the last place are meaningless, and only absolute errors count.
 const SMALLEST_IN_UNITS: f64 = 1e-6;
 
 impl Side {
@@ -281,9 +283,9 @@ fn ratio(error: f64, bound: f64) -> f64 {
     }
 }
 
-/// What a twin returns, as numbers.
+/// What a twin returns, convertible to numbers.
 pub trait Results {
-    /// One behind the other.
+    /// The numbers one after the other.
     fn numbers(self) -> Numbers;
 }
 

@@ -1,4 +1,5 @@
-//! A whole light component, angles and all, against the record that the shader is given. Not the function at its corners: that is `lights`.
+//! Compares a whole light component, with its angles, with the record that the shader gets. The function at its
+//! corners is tested in `lights`.
 
 use glam::{DVec3, Vec3};
 use lumbre_optics::{Light, LightKind, SpotCone, evaluate_light};
@@ -18,7 +19,7 @@ const CALL: &str = "let light = LightParameters(vec3<f32>(x[0], x[1], x[2]), u32
     return array<f32, 14>(r.attenuation, r.spot, r.direction.x, r.direction.y, r.direction.z, r.ambient.x, r.ambient.y, r.ambient.z,
     r.diffuse.x, r.diffuse.y, r.diffuse.z, r.specular.x, r.specular.y, r.specular.z);";
 
-/// A light, where it stands, its axis, and the point that it lights.
+/// A light, its position, its axis, and the point that it lights.
 struct Case {
     light: Light,
     position: Vec3,
@@ -48,7 +49,7 @@ impl Case {
         };
         let point = 4.0 * sequence.unit();
         let axis = sequence.unit();
-        // Every tenth light stands at the point itself.
+        // Every tenth light is at the point itself.
         let position = if number % 10 == 6 { point } else { 5.0 * sequence.unit() };
         Self { light, position, axis, point }
     }
@@ -95,8 +96,8 @@ fn a_light_component_and_its_record_are_the_same_light() {
     let got = kernel.run(gpu(), &input);
     for (case, got) in cases.iter().zip(got.chunks_exact(RESULTS)) {
         for (place, (got, expected)) in got.iter().zip(case.expected()).enumerate() {
-            // The position's rounding is 5 m times 2⁻²⁴ over a distance of a decimetre or more; the smooth cone divides by .79.
-            // Attenuation and cone are judged relative to themselves.
+            // The position's rounding is 5 m times 2⁻²⁴, over a distance of a decimetre or more; the smooth cone
+            // divides by .79. Attenuation and cone are compared relative to themselves.
             let scale = if place < 2 { expected.abs().max(1e-3) } else { 1.0 };
             let error = (f64::from(*got) - expected).abs();
             assert!(error <= 1e-5 * scale, "result {place}: {got} and {expected} of {:?}", case.light);

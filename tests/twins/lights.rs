@@ -1,4 +1,4 @@
-//! Lights: distance, cones, and a light as a point meets it.
+//! Lights: distance attenuation, cones, and a light as it reaches a point.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -23,7 +23,7 @@ fn distances(sequence: &mut Sequence) -> Vec<f32> {
 
 fn cone(sequence: &mut Sequence, smooth: bool) -> Vec<f32> {
     let outer = sequence.next();
-    // Half of the points near the edge of the cone.
+    // Half of the points are near the edge of the cone.
     let near = outer + sequence.decades(-7.0, -1.0) * (2.0 * sequence.next() - 1.0);
     let cosine = if sequence.next() < 0.5 { near.clamp(-1.0, 1.0) } else { sequence.between(-1.0, 1.0) };
     let inner = outer + (1.0 - outer) * sequence.next();
@@ -49,7 +49,7 @@ fn attenuation() -> Twin {
         .range(0.0, 1.001e30)
 }
 
-/// Constant, 1/range², squared distance.
+/// Random constant, 1/range² and squared distance.
 fn squares(sequence: &mut Sequence) -> Vec<f32> {
     let range = sequence.decades(-2.0, 4.0);
     let distance = if sequence.next() < 0.7 { range * sequence.next() } else { sequence.decades(-4.0, 4.0) };
@@ -70,7 +70,7 @@ fn attenuation_quadratic() -> Twin {
         .range(0.0, 1.001e4)
 }
 
-/// A smooth cone about some axis, and a direction, half of them near the cone's edge.
+/// Smooth cones around random axes, and directions of which half are near the cone's edge.
 fn smooth_cones(sequence: &mut Sequence) -> Vec<f32> {
     let outer = f64::from(sequence.next());
     let inner = outer + (1.0 - outer) * f64::from(sequence.next());
@@ -129,13 +129,13 @@ fn spots() -> [Twin; 2] {
     ]
 }
 
-/// Range, position, axis, cosine of the cone's edge, attenuation, exponent or inner cosine, point.
+/// Random range, position, axis, cosine of the cone's edge, attenuation, exponent or inner cosine, and point.
 fn placed(sequence: &mut Sequence, directional: bool, smooth: bool) -> Vec<f32> {
     let position = sequence.unit() * sequence.between(0.0, 20.0);
     let axis = sequence.unit();
     let cone = cone(sequence, smooth);
     let attenuation = [(); 3].map(|()| sequence.next() + 1e-3);
-    // In and around the cone.
+    // Points in and around the cone.
     let aside = sequence.unit() * sequence.next();
     let point = position + (axis + aside) * sequence.decades(-2.0, 1.5);
     let range = if directional || sequence.next() < 0.5 { 1e30 } else { sequence.between(1.0, 40.0) };
@@ -149,7 +149,7 @@ fn placed(sequence: &mut Sequence, directional: bool, smooth: bool) -> Vec<f32> 
     input
 }
 
-/// Lights at, near and far from the origin, where the point is; with no axis; with every kind of edge.
+/// Lights at, near and far from the origin, which is the point; without an axis; with every kind of edge.
 fn hard_lights() -> Vec<Vec<f32>> {
     let near =
         [Vec3::ZERO, Vec3::Y, Vec3::new(1e-20, 0.0, 0.0), Vec3::splat(1e5), Vec3::new(0.0, -0.005, 0.0)];

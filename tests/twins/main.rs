@@ -1,6 +1,7 @@
-//! Every lighting function of `shaders/optics` on the GPU against its f64 twin, over a million random and a hundred thousand hard
-//! inputs each. `cargo test --workspace --test twins -- --nocapture` prints the table; `LUMBRE_TWIN=name` runs the functions with
-//! that in their names, `LUMBRE_TWIN_WORST=1` prints the worst input of each as `worst_inputs.rs` has it.
+//! Compares every lighting function of `shaders/optics` on the GPU with its f64 twin, over a million random and a
+//! hundred thousand hard inputs each. `cargo test --workspace --test twins -- --nocapture` prints the table.
+//! `LUMBRE_TWIN=name` selects the functions with that in their names, and `LUMBRE_TWIN_WORST=1` prints the worst
+//! input of each in the form of `worst_inputs.rs`.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 #![allow(clippy::print_stdout, reason = "the table is what the test is for")]
@@ -31,13 +32,13 @@ use judge::Twin;
 use lumbre_render::Gpu;
 use verdict::{HEADING, LEGEND};
 
-/// The device of all tests here.
+/// The device of all tests in this target.
 fn gpu() -> &'static Gpu {
     static GPU: OnceLock<Gpu> = OnceLock::new();
     GPU.get_or_init(|| Gpu::headless().unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// Every function.
+/// The twins of all functions.
 fn all() -> &'static [Twin] {
     static ALL: OnceLock<Vec<Twin>> = OnceLock::new();
     let modules = || {
@@ -57,7 +58,7 @@ fn all() -> &'static [Twin] {
     ALL.get_or_init(|| modules().into_iter().flatten().collect())
 }
 
-/// The twin of that name.
+/// Returns the twin with that name.
 fn twin(name: &str) -> &'static Twin {
     let mut found = all().iter().filter(|twin| twin.name == name);
     match (found.next(), found.next()) {

@@ -1,4 +1,4 @@
-//! What textures bend and weaken, and the highlights of glTF's materials.
+//! Normal maps and occlusion textures, and the highlights of glTF's materials.
 
 use glam::DVec4;
 use lumbre_optics::*;

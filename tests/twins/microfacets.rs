@@ -13,7 +13,7 @@ use crate::inputs::{EXPONENTS, Sequence, crossed, product};
 use crate::judge::Twin;
 use crate::vectors::vector;
 
-/// cos, sin² and an exponent at which the distribution there is neither 0 nor 1, mostly.
+/// Random cos, sin² and an exponent for which the distribution is mostly neither 0 nor 1.
 fn distribution(sequence: &mut Sequence) -> Vec<f32> {
     let angle = f64::from(sequence.decades(-5.0, 0.19));
     let exponent = f64::from(sequence.decades(-2.0, 1.0)) / angle.powi(2);
@@ -27,12 +27,12 @@ fn hard_distributions() -> Vec<Vec<f32>> {
 }
 
 fn angles() -> [Twin; 4] {
-    // 8 ln 2 = 5.545: where the series takes over from the exponential.
+    // 8 ln 2 = 5.545, where the series takes over from the exponential.
     let exponents = [&EXPONENTS[..], &[5.5, 5.545_177, 5.6]].concat();
     [
         Twin::new("angle", "quarter_angle", &[], &[Type::Number; 2], Type::Number)
             .expect(|x| quarter_angle(x[0], x[1]))
-            // Two numbers that are both nearly nothing have no angle.
+            // Two numbers that are both almost 0 have no meaningful angle.
             .within(|x| match x[0].max(x[1]) < 1e-29 {
                 true => std::f64::consts::FRAC_PI_2,
                 false => bound::quarter_angle(x[0].max(0.0), x[1].max(0.0)),
@@ -145,7 +145,7 @@ fn chosen_lobe(distribution: Distribution) -> Twin {
         .range_up_to(0.0, 10_000.01, 1e6)
 }
 
-/// A metal's constants, the same for all inputs, as a material's are.
+/// A metal's constants, which are the same for all inputs, like those of a material.
 const GOLD: Fresnel = Fresnel::Conductor {
     eta: glam::Vec3::new(0.17, 0.42, 1.38),
     absorption: glam::Vec3::new(3.15, 2.35, 1.92),

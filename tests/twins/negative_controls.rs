@@ -1,11 +1,11 @@
-//! Shaders with a slip in them, each of which the comparison has to see: what it would take for one to go unnoticed is known.
+//! Shaders with a deliberate mistake, each of which the comparison has to detect.
 
 use crate::twin;
 
-/// Random inputs that suffice to see a slip.
+/// Number of random inputs that suffice to detect a mistake.
 const ENOUGH: usize = 20_000;
 
-/// A twin with a slip in its shader does not pass, by more than `factor` bounds.
+/// Checks that a twin with a mistake in its shader fails by more than `factor` bounds.
 fn is_seen(name: &str, module: &str, from: &str, to: &str, factor: f64) {
     let mutated = twin(name).mutated(module, from, to);
     let verdict = mutated.judge_some(crate::gpu(), ENOUGH);
@@ -41,7 +41,7 @@ fn a_missing_clamp() {
 
 #[test]
 fn a_logarithm_of_half_the_digits() {
-    // As in f16: 11 bits.
+    // 11 bits, as in f16.
     let from = "pow(clamp(base, SMALLEST_BASE, 1.0), clamp(exponent, 0.0, LARGEST_EXPONENT))";
     let to = "exp2(exponent * floor(log2(clamp(base, SMALLEST_BASE, 1.0)) * 2048.0) / 2048.0)";
     for name in ["safe_pow", "phong (plain)", "spot_factor (exponent)"] {
@@ -51,7 +51,7 @@ fn a_logarithm_of_half_the_digits() {
 
 #[test]
 fn highlights_without_the_sine() {
-    // What SHARP_HIGHLIGHTS is for.
+    // This is what SHARP_HIGHLIGHTS is for.
     is_seen("cosine_lobe (sharp)", "power", "if cosine > NEARLY_PARALLEL {", "if cosine > 2.0 {", 10.0);
 }
 
@@ -64,16 +64,17 @@ fn a_series_one_term_short() {
 
 #[test]
 fn cancellation_that_the_shaders_avoid() {
-    // The half vector's length from 2 + 2 l.v.
+    // The half vector's length computed from 2 + 2 l.v.
     let from = "safe_normalize(light + viewer)";
     let to = "(light + viewer) * inverseSqrt(max(2.0 + 2.0 * dot(light, viewer), 1e-30))";
     is_seen("half_vector", "half_vector", from, to, 10.0);
-    // 1 - exp(-x) as it stands.
+    // 1 - exp(-x) computed directly.
     is_seen("half_value_sine_squared", "microfacets", "x < 0.25", "x < 0.0", 10.0);
     // v.h near l = -v.
     let from = "0.5 * sqrt(max(squared_length(sum), TINY_LENGTH_SQUARED))";
     is_seen("cosine_to_half", "torrance_sparrow", from, "0.5 * sqrt(squared_length(sum) + 1e-7)", 10.0);
-    // The refracted direction from the sine, as it was: nothing is left of it where light grazes.
+    // The refracted direction computed from the sine, as in an earlier version: nothing is left of it at grazing
+    // angles.
     let from = "(index - 1.0) * (index + 1.0) + cos_incident * cos_incident";
     let to = "index * index - squared_length(cross(normal, light))";
     is_seen("transmitted_direction", "snell", from, to, 10.0);
@@ -89,7 +90,8 @@ fn conditions_on_the_wrong_side() {
 
 #[test]
 fn a_contour_that_does_not_close() {
-    // As it was: where a corner lies on the horizon, rounding let the contour set without rising.
+    // An earlier version: where a corner is on the horizon, rounding let the contour go below it without coming
+    // back up.
     let from = "select(height + dot(normal, end), first, index == 3u)";
     is_seen("polygon_form_factor", "polygon_light", from, "height + dot(normal, end)", 10.0);
 }

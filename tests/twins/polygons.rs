@@ -11,13 +11,14 @@ use crate::vectors::vector;
 /// θ/sin θ - 1 from tan²(θ/2), in f64.
 fn arc_excess(square: f64) -> f64 {
     if square < 1e-4 {
-        // (1 + x) atan(√x)/√x - 1 = Σ (-1)^k 2 x^(k+1)/((2k + 1)(2k + 3)): the next term is under 10⁻¹⁷.
+        // (1 + x) atan(√x)/√x - 1 = Σ (-1)^k 2 x^(k+1)/((2k + 1)(2k + 3)); the next term is under 10⁻¹⁷.
         return square * (2.0 / 3.0 - square * (2.0 / 15.0 - square * (2.0 / 35.0 - square * 2.0 / 63.0)));
     }
     (1.0 + square) * square.sqrt().atan() / square.sqrt() - 1.0
 }
 
-/// Corner, two edges, whether a triangle, point, normal: of aspects up to 100, from a tenth to a hundred thousand sizes away.
+/// Random corner, two edges, whether it is a triangle, point, and normal: aspect ratios up to 100, from a tenth to
+/// a hundred thousand sizes away.
 fn polygon(sequence: &mut Sequence) -> Vec<f32> {
     let (along, other) = (sequence.unit(), sequence.unit());
     let size = sequence.decades(-1.0, 1.0);
@@ -40,7 +41,7 @@ fn polygon(sequence: &mut Sequence) -> Vec<f32> {
     input
 }
 
-/// A unit square over points in its corners' and edges' lines, its plane, its middle and its horizon.
+/// A unit square with points on the lines of its corners and edges, in its plane, at its middle and at its horizon.
 fn hard_polygons() -> Vec<Vec<f32>> {
     let mut all = Vec::new();
     let points = product(&[
@@ -53,7 +54,7 @@ fn hard_polygons() -> Vec<Vec<f32>> {
     for point in points {
         for normal in normals {
             for triangle in [0.0, 1.0] {
-                // Its front is up.
+                // Its front faces up.
                 let square = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, triangle];
                 all.push([&square[..], &point, &normal].concat());
             }

@@ -1,4 +1,5 @@
-//! What surfaces read of an irradiance volume: where a point stands in its grid, and the light of an ambient cube.
+//! What surfaces read from an irradiance volume: the position of a point in its grid, and the light of an ambient
+//! cube.
 
 use glam::DVec4;
 use lumbre_optics::*;
@@ -13,7 +14,7 @@ fn side(x: &[f64], at: usize) -> DVec4 {
     DVec4::from_slice(&x[at..at + 4])
 }
 
-/// Light of any brightness, times its openness.
+/// Light of any brightness, premultiplied by its openness.
 fn random_cube(sequence: &mut Sequence) -> Vec<f32> {
     let openness = if sequence.next() < 0.3 { sequence.decades(-3.0, 0.0) } else { 1.0 };
     let sides = (0..3).flat_map(|_| {
@@ -29,7 +30,7 @@ fn grid(sequence: &mut Sequence) -> Vec<f32> {
     let mirrored = if sequence.next() < 0.2 { -1.0 } else { 1.0 };
     let scale = [(); 3].map(|()| sequence.decades(-1.5, 2.0) * mirrored);
     let offset = [(); 3].map(|()| sequence.between(-300.0, 300.0));
-    // Within the grid, and around it.
+    // Points within the grid and around it.
     let place = |axis: usize, part: f32| (part * resolution[axis] - offset[axis]) / scale[axis];
     let point = [0, 1, 2].map(|axis| place(axis, sequence.between(-0.3, 1.3)));
     [point, scale, offset, resolution].concat()

@@ -14,13 +14,13 @@ use crate::vectors::vector;
 const COSINES: [f32; 10] = [-1.0, -0.0, 0.0, 1e-20, 1e-7, 1e-3, 0.5, 0.745_356, 1.0, 1.1];
 const INDICES: [f32; 9] = [0.0, 1e-4, 0.4, 0.666_666_7, 0.999_999, 1.0, 1.000_001, 1.5, 1e4];
 
-/// 1/3 to 3.
+/// A random index from 1/3 to 3.
 fn index(sequence: &mut Sequence) -> f32 {
     let index = sequence.between(1.0, 3.0);
     if sequence.next() < 0.5 { index } else { index.recip() }
 }
 
-/// A sine and an index; half of them near the critical angle.
+/// A random sine and index, half of them near the critical angle.
 fn sine_and_index(sequence: &mut Sequence) -> Vec<f32> {
     let index = index(sequence);
     let near = index * (1.0 + sequence.decades(-6.0, -1.0) * (2.0 * sequence.next() - 1.0));
@@ -28,7 +28,7 @@ fn sine_and_index(sequence: &mut Sequence) -> Vec<f32> {
     vec![sine, index]
 }
 
-/// A cosine and an index; a third of them near the critical angle, a third grazing.
+/// A random cosine and index, a third of them near the critical angle and a third grazing.
 fn cosine_and_index(sequence: &mut Sequence) -> Vec<f32> {
     let [sine, index]: [f32; 2] = sine_and_index(sequence).try_into().unwrap_or([0.0, 1.0]);
     let cosine = match sequence.bits() % 3 {
@@ -43,7 +43,7 @@ fn ray(sequence: &mut Sequence) -> Vec<f32> {
     let mut ray = lobe(sequence)[..6].to_vec();
     ray.push(index(sequence));
     if sequence.next() < 0.2 {
-        // Grazing.
+        // Grazing light.
         let normal = leading(&ray).as_dvec3();
         let aside = normal.cross(sequence.unit().as_dvec3()).normalize_or_zero();
         let light = (aside + f64::from(sequence.decades(-6.0, -1.0)) * normal).normalize_or_zero();

@@ -1,4 +1,5 @@
-//! Single inputs that showed a weakness once, with what is right there. Those that came nearest to a bound are in `worst_inputs`.
+//! Single inputs that once showed a weakness, with the correct results. The inputs that came nearest to a bound are
+//! in `worst_inputs`.
 
 use glam::DVec3;
 use lumbre_optics as optics;
@@ -6,12 +7,12 @@ use lumbre_optics as optics;
 use crate::bounds::{Numbers, U};
 use crate::{gpu, twin};
 
-/// The device's result for one input of a function.
+/// Returns the device's result for one input of a function.
 pub fn got(name: &str, input: &[f32]) -> Vec<f64> {
     twin(name).kernel.run(gpu(), input).into_iter().map(f64::from).collect()
 }
 
-/// One number within so many u, and the twin nearer.
+/// Checks that a result with one number is within this many u, and that the twin is nearer.
 fn is_near(name: &str, input: &[f32], expected: f64, roundings: f64) {
     let device = got(name, input)[0];
     let (asked, _) = twin(name).asked(input);
@@ -22,7 +23,8 @@ fn is_near(name: &str, input: &[f32], expected: f64, roundings: f64) {
 
 #[test]
 fn light_that_grazes_equal_media_goes_straight_on() {
-    // From the sine the f32 direction was zero here, "totally reflected": an error of 1. From the cosine it is a rounding.
+    // Computed from the sine, the f32 direction was zero here, "totally reflected", an error of 1. Computed from
+    // the cosine the error is a rounding.
     let normal = DVec3::new(0.48, 0.6, 0.64);
     for height in [1e-2, 1e-4, 1e-6] {
         let light = (normal.cross(DVec3::X).normalize() + height * normal).normalize().as_vec3();
@@ -41,7 +43,7 @@ fn light_that_grazes_equal_media_goes_straight_on() {
 
 #[test]
 fn the_half_value_angle_of_a_lobe_that_is_hardly_one() {
-    // acos(2^(-1/n)): from 1 - sin² it was off by 1.7e-4 where cos² is a few roundings.
+    // acos(2^(-1/n)): computed from 1 - sin² it was off by 1.7e-4 where cos² is a few roundings.
     for exponent in [0.05f32, 0.08, 0.1, 1.0] {
         let expected = (-std::f64::consts::LN_2 / f64::from(exponent)).exp().acos();
         is_near("half_value_angle", &[exponent], expected, 16.0);
@@ -50,7 +52,7 @@ fn the_half_value_angle_of_a_lobe_that_is_hardly_one() {
 
 #[test]
 fn an_exponent_whose_fourfold_overflows() {
-    // 4 n was infinite, and infinity times log2(1) no number. At l = v = n the lobe is 1.
+    // 4 n was infinite, and infinity times log2(1) is NaN. At l = v = n the lobe is 1.
     let up = [0.0, 1.0, 0.0];
     for name in ["blinn_phong_4n (plain)", "blinn_phong_4n (sharp)", "blinn_phong_matched (sharp)"] {
         let input = [&up[..], &up, &up, &[2e38]].concat();
@@ -60,7 +62,8 @@ fn an_exponent_whose_fourfold_overflows() {
 
 #[test]
 fn bases_and_exponents_near_nothing() {
-    // 10⁻³⁸ to the power .001 was 10⁻³⁰ to that power in the shader and itself in the twin: .933 and .916.
+    // 10⁻³⁸ to the power .001 was computed as 10⁻³⁰ to that power in the shader and as itself in the twin: .933 and
+    // .916.
     for input in [[1e-38, 1e-3], [-0.0, 1e-3], [0.0, 1e-29], [f32::from_bits(1), 0.5]] {
         assert_eq!(got("safe_pow", &input), [0.0]);
         assert_eq!(optics::safe_pow(input[0].into(), input[1].into()), 0.0);
@@ -74,7 +77,7 @@ fn bases_and_exponents_near_nothing() {
 
 #[test]
 fn fog_thinner_than_numbers_divide() {
-    // A span among the denormals was divided by: a device that takes it for 0 had 0/0.
+    // A denormal span was divided by; a device that flushes it to 0 computed 0/0.
     let thin = f32::from_bits(3);
     for (distance, fraction) in [(0.0, 0.0), (1e-20, 1.0), (1.0, 1.0)] {
         assert_eq!(got("fog_fraction", &[0.0, 1e-36, distance]), [fraction], "{distance}");
@@ -85,7 +88,8 @@ fn fog_thinner_than_numbers_divide() {
 
 #[test]
 fn a_light_ends_where_its_range_does() {
-    // The window is a difference from 1 of a quotient that may be 2.5 units too large: it may not become negative.
+    // The window is 1 minus a quotient that may be 2.5 units in the last place too large, and must not become
+    // negative.
     for range in [0.1f32, 0.3, 7.0, 1e-20, 33.3] {
         for distance in [range, range.next_up(), 2.0 * range] {
             let factor = got("attenuate", &[0.0, 0.0, 1.0, 0.0, range, distance])[0];
@@ -97,7 +101,7 @@ fn a_light_ends_where_its_range_does() {
 
 #[test]
 fn indices_that_no_medium_has() {
-    // At 10⁻⁴ the direction was noise: errors of 2. Indices under .01 count as that.
+    // At 10⁻⁴ the direction was noise, with errors of 2. Indices under .01 are clamped to that.
     let input = [0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1e-4];
     let (expected, allowed) = twin("transmitted_direction").asked(&input);
     assert_eq!(expected, Numbers::from_slice(&[0.0, -1.0, 0.0]));
@@ -108,8 +112,8 @@ fn indices_that_no_medium_has() {
 
 #[test]
 fn a_polygon_with_an_edge_on_the_horizon() {
-    // A triangle far away whose edge lies in the horizon's plane: its contour set and never rose, which made it twelve times too
-    // bright. To first order F = A cos cos / (pi d^2).
+    // A distant triangle with an edge in the horizon's plane: its contour went below the horizon and never came
+    // back up, which made it twelve times too bright. To first order F = A cos cos / (pi d^2).
     let input = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 100.0, -30.0, 1.0, 0.0, 0.0];
     for turned in [3e-45, 0.0, -4e-45] {
         let mut input = input;

@@ -26,8 +26,8 @@ fn specular(model: ReflectionModel) -> Twin {
         .range_up_to(0.0, 10_000.02, 1e6)
 }
 
-/// Three coefficients, three colours, exponent, index, direction to the light, its two factors, normal, viewer. The colours are turned
-/// round from part to part, so that parts and channels cannot be mistaken for each other.
+/// Three coefficients, three colours, exponent, index, direction to the light, its two factors, normal, viewer. The
+/// channels are rotated from part to part, so that parts and channels cannot be mistaken for each other.
 const CALL: &str = "let k = vec3<f32>(x[0], x[1], x[2]);
     let c = vec3<f32>(x[3], x[4], x[5]);
     let surface = SurfaceSample(k, k.yzx, k.zxy, x[6], x[7]);

@@ -1,4 +1,4 @@
-//! Vectors: unit lengths, half vectors, facing, viewers, Lambert's cosine, emission.
+//! Vectors: normalization, half vectors, facing, viewers, Lambert's cosine, emission.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -10,7 +10,7 @@ use crate::bounds::{Allowed, FLUSHED, Numbers, U, vectors};
 use crate::inputs::{Sequence, hard_directions, product};
 use crate::judge::Twin;
 
-/// Three numbers of an input as a vector.
+/// Returns three numbers of an input as a vector.
 pub fn vector(x: &[f64], at: usize) -> DVec3 {
     DVec3::from_slice(&x[at..at + 3])
 }
@@ -28,7 +28,7 @@ fn two(sequence: &mut Sequence) -> Vec<f32> {
     [light.to_array(), viewer.to_array()].concat()
 }
 
-/// Vectors of every length from none to what a square can hold.
+/// Vectors of every length from zero to the largest whose square is finite.
 fn lengths() -> Vec<Vec<f32>> {
     let lengths = [0.0, 1e-38, 1e-19, 6e-16, 1e-15, 1.1e-15, 1e-10, 1e-3, 1.0, 1e10, 1e18];
     let directions = [[1.0, 0.0, 0.0], [0.6, -0.8, 0.0], [0.5, 0.5, -FRAC_1_SQRT_2], [1e-7, 1.0, -0.0]];
@@ -52,7 +52,7 @@ fn normalization() -> [Twin; 2] {
     ]
 }
 
-/// Which of its two normals a face is shaded with is open where the interpolated one is within rounding of having no direction.
+/// Where the interpolated normal is within rounding of having no direction, either of the two normals may be used.
 fn shading_normal_bound(x: &[f64]) -> Allowed {
     let interpolated = vector(x, 0);
     let unit = safe_normalize(interpolated);
@@ -89,7 +89,7 @@ fn viewer() -> Twin {
     let eyes = lengths();
     let corners = eyes.iter().flat_map(|eye| {
         [0.0, 1.0].into_iter().flat_map(|local| {
-            // Points at the origin, at the eye, and beside it.
+            // Points at the origin, at the eye, and next to it.
             let beside: Vec<f32> = eye.iter().map(|c| c * 1.000_001 + 1e-6).collect();
             [vec![0.0; 3], eye.clone(), beside]
                 .map(|point| [&[local], eye.as_slice(), &[0.0, 0.6, 0.8], point.as_slice()].concat())

@@ -1,8 +1,8 @@
-//! What comparisons found, and the table of it.
+//! The results of comparisons, and the table of them.
 
 use std::fmt;
 
-/// What the comparison of some inputs found. Joined as the worst of each.
+/// The results of comparing some inputs. Joining two takes the worst of each.
 #[derive(Clone, Debug, Default)]
 pub struct Part {
     pub count: usize,
@@ -10,17 +10,17 @@ pub struct Part {
     pub absolute: f64,
     /// Largest difference in units of the last place of the expected value.
     pub ulp: f64,
-    /// Largest difference in terms of its bound.
+    /// Largest difference relative to its bound.
     pub ratio: f64,
-    /// Largest difference from the program's exact value in terms of its running error.
+    /// Largest difference from the program's exact value relative to its running error.
     pub machine: f64,
-    /// Largest error that the running error admits, in terms of the stated bound.
+    /// Largest error that the running error admits, relative to the stated bound.
     pub reach: f64,
-    /// Inputs within rounding of a condition.
+    /// Number of inputs within rounding of a condition.
     pub open: usize,
-    /// Those of them that the device put on the other side.
+    /// Number of those for which the device took the other side.
     pub crossed: usize,
-    /// Where the ratio is largest.
+    /// The input with the largest ratio.
     pub input: Vec<f32>,
     pub got: Vec<f32>,
     pub expected: Vec<f64>,
@@ -45,20 +45,20 @@ impl Part {
     }
 }
 
-/// What all comparisons of a function found.
+/// The results of all comparisons of a function.
 #[derive(Clone, Debug)]
 pub struct Verdict {
     pub name: String,
     pub random: Part,
     pub hard: Part,
-    /// Random inputs that may be open, in a million.
+    /// How many random inputs may be within rounding of a condition.
     pub most_open: usize,
-    /// Inputs of any size whose results are not finite or out of range, and one of them.
+    /// Number of inputs of any size whose results are not finite or out of range, and one of them.
     pub wild: (usize, Vec<f32>),
 }
 
 impl Verdict {
-    /// The part with the larger ratio.
+    /// Returns the part with the larger ratio.
     pub fn worst(&self) -> &Part {
         if self.hard.ratio > self.random.ratio { &self.hard } else { &self.random }
     }
@@ -73,7 +73,7 @@ impl Verdict {
 }
 
 impl Verdict {
-    /// The worst input as a line of `worst_inputs.rs`.
+    /// Formats the worst input as a line of `worst_inputs.rs`.
     pub fn regression(&self) -> String {
         let slug: String = self
             .name
@@ -90,7 +90,7 @@ impl Verdict {
     }
 }
 
-/// The distance between neighbouring f32 at a value.
+/// Returns the distance between neighbouring f32 at a value.
 pub fn unit_in_the_last_place(value: f64) -> f64 {
     let magnitude = (value.abs() as f32).clamp(f32::MIN_POSITIVE, f32::MAX / 2.0);
     f64::from(magnitude.next_up()) - f64::from(magnitude)

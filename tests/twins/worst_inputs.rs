@@ -1,12 +1,12 @@
-//! For each function the input that came nearest to its bound, as the table printed it (`LUMBRE_TWIN_WORST=1`): its bits, so that
-//! nothing is lost in writing it down, what is right there, and the bound as it was then.
+//! For each function the input that came nearest to its bound, as printed by `LUMBRE_TWIN_WORST=1`: its exact bits,
+//! the correct result, and the bound at that time.
 
 #![allow(clippy::approx_constant, reason = "expected values are what they are")]
 
 use crate::regressions::got;
 use crate::twin;
 
-/// The device and the twin give what is expected, and the bound is still as narrow as it was.
+/// Checks that device and twin give the expected results, and that the bound has not become wider.
 fn holds(name: &str, bits: &str, expected: &[f64], bound: &[f64]) {
     let input: Vec<f32> =
         bits.split(' ').map(|bits| f32::from_bits(u32::from_str_radix(bits, 16).unwrap())).collect();
@@ -18,7 +18,7 @@ fn holds(name: &str, bits: &str, expected: &[f64], bound: &[f64]) {
             .enumerate()
             .all(|(at, (value, expected))| (value - expected).abs() <= bound(at))
     };
-    // Other libraries round the last bits of a power otherwise.
+    // Other math libraries round the last bits of a power differently.
     let nearly = |at: usize| 1e-9 * expected[at].abs() + 1e-12 * bound[at];
     let other = allowed.other.as_ref();
     let is_other = |values: &[f64], near: &dyn Fn(usize) -> f64| {

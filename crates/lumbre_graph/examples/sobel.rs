@@ -1,7 +1,7 @@
-//! A graph of two passes on a device: one draws a disc into a transient texture, the other finds its edge through a bind group over that
-//! texture. Prints the plan and how many texels the edge has.
+//! A graph of two passes on a device: one draws a disc into a transient texture, and the other finds its edge
+//! through a bind group for that texture. It prints the plan and the number of texels on the edge.
 //!
-//! `cargo run --release -p lumbre_graph --example sobel`
+//! Run it with `cargo run --release -p lumbre_graph --example sobel`.
 
 #![allow(clippy::print_stdout, reason = "what it prints is what one wants of it")]
 
@@ -61,7 +61,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Ok(())
     });
     graph.raster_pass("sobel").samples(&image).color(&mut edges, clear).run(|context| {
-        // The texture exists from here on only: the executor chose its memory for this frame.
+        // The texture is only available from here on, as the executor chose its memory for this frame.
         let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("image"),
             layout: &sobel.get_bind_group_layout(0),
@@ -105,7 +105,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// One triangle over the whole target.
+/// A pipeline that draws one triangle covering the whole target.
 fn pipeline(device: &wgpu::Device, module: &wgpu::ShaderModule, fragment: &str) -> wgpu::RenderPipeline {
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(fragment),

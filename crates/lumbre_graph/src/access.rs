@@ -1,14 +1,16 @@
-//! How a pass uses a resource, and which GPU usage follows from it. Not who uses it: see `declare::declaration`.
+//! How a pass uses a resource, and which GPU usage follows from that. Which pass uses which resource is in
+//! `declaration`.
 
-/// What an attachment holds when its pass begins.
+/// The content of an attachment when its pass begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoadOp<V> {
-    /// This value everywhere; what was there before is not needed.
+    /// It is cleared to this value; the previous content is not needed.
     Clear(V),
-    /// What was there before; an error if nothing was.
+    /// It keeps its previous content; it is an error if there is none.
     Load,
-    /// What the passes of this frame wrote before; this value if none of them did. So a chain of passes that each may
-    /// be skipped needs no pass that clears: whichever runs first does.
+    /// It keeps what earlier passes of this frame wrote, and is cleared to this value if none of them did. A chain
+    /// of passes that each may be skipped therefore needs no extra pass that clears: the first one that runs does
+    /// it.
     ClearIfFirst(V),
 }
 
@@ -46,14 +48,14 @@ pub enum TextureRead {
     CopySource,
 }
 
-/// How a pass writes a texture otherwise than as an attachment.
+/// How a pass writes a texture other than as an attachment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureWrite {
-    /// In a shader, as a storage texture, perhaps reading it too.
+    /// In a shader, as a storage texture, which may also be read.
     Storage,
     /// As the destination of a copy.
     CopyDestination,
-    /// As attachment of render passes that a transfer pass begins by itself.
+    /// As an attachment of render passes that a transfer pass begins itself.
     Attachment,
 }
 
@@ -77,7 +79,7 @@ pub enum BufferRead {
 /// How a pass writes a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BufferWrite {
-    /// In a shader, as storage, perhaps reading it too.
+    /// In a shader, as storage, which may also be read.
     Storage,
     /// As the destination of a copy.
     CopyDestination,
@@ -108,7 +110,7 @@ impl Access {
         matches!(self, Self::Color(_) | Self::Resolve { .. } | Self::Depth(_) | Self::DepthReadOnly)
     }
 
-    /// Adds the value that an attachment is cleared to, bit by bit.
+    /// Hashes the exact bits of the value that an attachment is cleared to.
     pub fn hash_clear(&self, hasher: &mut impl std::hash::Hasher) {
         match self {
             Self::Color(LoadOp::Clear(color) | LoadOp::ClearIfFirst(color)) => {
@@ -137,7 +139,7 @@ impl Access {
         matches!(self, Self::WriteTexture(TextureWrite::Attachment))
     }
 
-    /// For messages and explanations.
+    /// A description for messages and explanations.
     pub fn describe(&self) -> &'static str {
         match self {
             Self::Color(LoadOp::Clear(_)) => "colour attachment (clear)",
@@ -165,7 +167,7 @@ impl Access {
         }
     }
 
-    /// Usage that a texture needs for this; empty for a buffer's access.
+    /// The usage that a texture needs for this access; empty for an access to a buffer.
     pub fn texture_usage(&self) -> wgpu::TextureUsages {
         use wgpu::TextureUsages as Usage;
         match self {
@@ -184,7 +186,7 @@ impl Access {
         }
     }
 
-    /// Usage that a buffer needs for this; empty for a texture's access.
+    /// The usage that a buffer needs for this access; empty for an access to a texture.
     pub fn buffer_usage(&self) -> wgpu::BufferUsages {
         use wgpu::BufferUsages as Usage;
         match self {

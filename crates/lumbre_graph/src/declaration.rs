@@ -1,11 +1,12 @@
-//! What was declared, as plain data that can be compared: if nothing differs from last frame, last frame's plan holds.
+//! The declarations of a graph as plain data that can be compared. If nothing differs from last frame, last frame's
+//! plan is used again.
 
 use crate::access::{Access, Part};
 use crate::error::GraphError;
 use crate::resource::{Label, ResourceDeclaration};
 use crate::site::Site;
 
-/// What a pass records.
+/// What kind of commands a pass records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PassKind {
@@ -13,12 +14,12 @@ pub enum PassKind {
     Raster,
     /// Dispatches, inside a compute pass.
     Compute,
-    /// Commands on the encoder itself: copies, or passes begun by hand.
+    /// Commands on the encoder itself: copies, or passes that are begun by hand.
     Transfer,
 }
 
 impl PassKind {
-    /// In words.
+    /// Returns its name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -33,7 +34,7 @@ impl PassKind {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AccessDeclaration {
     pub resource: usize,
-    /// Version that the handle named: the one read, or the one written upon.
+    /// The version that the handle named: the one that is read, or the one that the write is applied to.
     pub version: u32,
     pub access: Access,
     pub part: Option<Part>,
@@ -41,18 +42,18 @@ pub(crate) struct AccessDeclaration {
 }
 
 impl AccessDeclaration {
-    /// The part this touches; `None` is all of it. An attachment is always a single part.
+    /// Returns the part that is accessed; `None` for all of it. An attachment is always a single part.
     pub fn touched_part(&self) -> Option<Part> {
         self.part.or_else(|| self.access.is_attachment().then(Part::default))
     }
 
-    /// The version that this makes.
+    /// Returns the version that this access makes, if it writes.
     pub fn written(&self) -> Option<u32> {
         self.access.writes().then_some(self.version + 1)
     }
 }
 
-/// A declared pass, without what it runs.
+/// A declared pass without its body.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PassDeclaration {
     pub name: Label,
@@ -60,7 +61,7 @@ pub(crate) struct PassDeclaration {
     pub owner: Option<Label>,
     pub kind: PassKind,
     pub accesses: Vec<AccessDeclaration>,
-    /// What the pass calls for, and whether it is there.
+    /// What the pass calls for, each with whether it is there.
     pub calls_for: Vec<(bool, Label)>,
     pub side_effects: Vec<Label>,
     pub fingerprint: Option<u64>,
@@ -74,18 +75,18 @@ impl PassDeclaration {
     }
 }
 
-/// A declared graph, without what its passes run.
+/// A declared graph without the bodies of its passes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Declarations {
     pub label: Label,
     pub resources: Vec<ResourceDeclaration>,
     pub passes: Vec<PassDeclaration>,
-    /// Faults seen while declaring, in order.
+    /// Faults found while declaring, in order.
     pub faults: Vec<GraphError>,
 }
 
 impl Declarations {
-    /// The pass that makes `version` of `resource`; none makes version 0.
+    /// Returns the pass that makes `version` of `resource`; `None` for version 0.
     pub fn producer(&self, resource: usize, version: u32) -> Option<usize> {
         let index = version.checked_sub(1)?;
         self.resources[resource].writers.get(index as usize).copied()

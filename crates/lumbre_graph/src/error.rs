@@ -1,5 +1,5 @@
-//! What can be wrong with a declared graph. Each error names the pass, the resource and where both were declared. What
-//! can go wrong while a graph runs is [`RunError`](crate::RunError).
+//! Faults of a declared graph. Each error names the pass, the resource and where both were declared. What can go
+//! wrong while a graph runs is [`RunError`](crate::RunError).
 
 use crate::resource::Label;
 use crate::site::Site;
@@ -9,18 +9,18 @@ use crate::site::Site;
 #[non_exhaustive]
 #[expect(missing_docs, reason = "each variant's message says what its fields are")]
 pub enum GraphError {
-    /// A handle of another graph.
+    /// A handle that belongs to another graph.
     #[error(
         "pass `{pass}` ({site}) uses a {kind} handle (resource {index}) that graph #{foreign} made, not this one: declare it here, or \
          import it"
     )]
     ForeignHandle { pass: Label, site: Site, kind: &'static str, index: u32, foreign: u64 },
 
-    /// Two passes, or two resources, of one name.
+    /// Two passes, or two resources, with the same name.
     #[error("two {kind} are named `{name}`: one declared at {first}, one at {second}; names must be unique")]
     DuplicateName { kind: &'static str, name: Label, first: Site, second: Site },
 
-    /// Two passes write on top of the same version.
+    /// Two passes that write the same version.
     #[error(
         "passes `{first}` ({first_site}) and `{second}` ({second_site}) both write version {version} of `{resource}`: the second holds a \
          handle copied before the first wrote; pass it the handle that the first moved on"
@@ -34,14 +34,14 @@ pub enum GraphError {
         second_site: Site,
     },
 
-    /// A pass reads what nothing ever writes.
+    /// A pass that reads a resource that no pass ever writes.
     #[error(
         "pass `{pass}` ({site}) reads `{resource}` (declared at {resource_site}) as {access}, but no pass writes it: add its producer, or \
          import it"
     )]
     MissingProducer { pass: Label, site: Site, resource: Label, resource_site: Site, access: &'static str },
 
-    /// A pass reads a version older than the first write.
+    /// A pass that reads a version older than the first write.
     #[error(
         "pass `{pass}` ({site}) reads `{resource}` as {access} before `{writer}` ({writer_site}) writes it: its handle was copied before that \
          write; declare the pass after the writer, with the writer's handle"
@@ -55,7 +55,7 @@ pub enum GraphError {
         writer_site: Site,
     },
 
-    /// A pass that runs reads what only skipped passes would have written.
+    /// A running pass that reads a resource that only skipped passes would have written.
     #[error(
         "pass `{pass}` ({site}) reads `{resource}` as {access}, but every pass that writes it is skipped ({skipped}): read it as optional, call \
          for the same in `{pass}`, or write it with LoadOp::ClearIfFirst in a pass that runs"
@@ -65,21 +65,21 @@ pub enum GraphError {
     /// Passes that wait for each other.
     #[error("passes wait for each other: {}", display_cycle(.path))]
     Cycle {
-        /// The passes in a circle; the last waits for the first.
+        /// The passes of the cycle; the last waits for the first.
         path: Vec<CycleStep>,
     },
 
-    /// `.after()` names no pass.
+    /// `.after()` with a name that no pass has.
     #[error("pass `{pass}` ({site}) is to run after `{name}`, which no pass is called{}", did_you_mean(.nearest))]
     UnknownPass { pass: Label, site: Site, name: Label, nearest: Option<Label> },
 
-    /// A pass uses one resource in two ways that the GPU can not do at once.
+    /// A pass that uses one resource in two ways that the GPU cannot combine.
     #[error(
         "pass `{pass}` ({site}) uses `{resource}` as {first} and as {second} at once: split the pass, or name separate parts"
     )]
     AccessConflict { pass: Label, site: Site, resource: Label, first: &'static str, second: &'static str },
 
-    /// A format that can not be used in this way.
+    /// A format that does not support this use.
     #[error(
         "pass `{pass}` ({site}) uses `{resource}` (declared at {resource_site}) as {access}, which needs {expected}, but its format is {format:?}"
     )]
@@ -93,7 +93,7 @@ pub enum GraphError {
         expected: String,
     },
 
-    /// Attachments of different size.
+    /// Attachments of different sizes.
     #[error(
         "pass `{pass}` ({site}) draws into `{first}` (declared at {first_site}) of {}x{} and `{second}` (declared at {second_site}) of {}x{} texels: \
          attachments must have one size",
@@ -110,7 +110,7 @@ pub enum GraphError {
         second_size: [u32; 2],
     },
 
-    /// A sample count that can not be used in this way.
+    /// A sample count that does not support this use.
     #[error(
         "pass `{pass}` ({site}) uses `{resource}` (declared at {resource_site}) as {access} with {count} samples per texel, but needs {expected}"
     )]
@@ -124,7 +124,7 @@ pub enum GraphError {
         expected: String,
     },
 
-    /// An imported resource that does not allow what a pass does with it.
+    /// An imported resource whose usages do not allow what a pass does with it.
     #[error(
         "pass `{pass}` ({site}) uses `{resource}` (declared at {resource_site}) as {access}, which needs usage {needs}, but it was imported with {declared}"
     )]
@@ -148,7 +148,7 @@ pub enum GraphError {
     )]
     PartOutOfRange { pass: Label, site: Site, resource: Label, mip: u32, layer: u32, mips: u32, layers: u32 },
 
-    /// `.resolve()` or `.part()` with nothing before it that it could apply to.
+    /// `.resolve()` or `.part()` without a preceding declaration that it could apply to.
     #[error(
         "pass `{pass}` ({site}): .{method}() applies to the {wanted} declared just before it, and there is none"
     )]
@@ -165,7 +165,8 @@ pub enum GraphError {
     ExportOverwritten { resource: Label, version: u32, pass: Label, site: Site },
 }
 
-/// What declaring and compiling answer with. Boxed: the errors carry many names, the way without one should be short.
+/// The result of declaring and compiling. The error is boxed because it contains many names and results should be
+/// small.
 pub type GraphResult<T> = Result<T, Box<GraphError>>;
 
 /// One pass of a [`GraphError::Cycle`] and why the next one waits for it.
@@ -173,7 +174,7 @@ pub type GraphResult<T> = Result<T, Box<GraphError>>;
 pub struct CycleStep {
     /// The pass.
     pub pass: Label,
-    /// Why the next pass of the circle runs after it.
+    /// Why the next pass of the cycle runs after it.
     pub because: String,
 }
 

@@ -1,4 +1,5 @@
-//! The executor: what outlives a frame. Memory, the last frames' plans, what retained resources hold, measurements.
+//! The executor: the state that outlives a frame. It holds GPU memory, the plans of the last frames, what is known
+//! about retained resources, and measurements.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -17,15 +18,16 @@ use crate::run::probe::FiniteProbe;
 use crate::run::record::{FrameResources, Recorder, looks};
 use crate::run::report::{ExecutionStages, GraphReport, Measurements};
 
-/// Plans that are kept.
+/// Number of plans that are kept.
 const KEPT_PLANS: usize = 8;
 
-/// Runs graphs, one per frame, on one device. After a lost device make a new one.
+/// Runs graphs, one per frame, on one device. After a device loss, create a new one.
 #[derive(Default)]
 pub struct Executor {
     pool: Pool,
     history: History,
-    /// Of the last frames, the newest last: what alternates (a shadow that moves now and then) is compiled once.
+    /// The plans of the last frames, the newest last. A graph that alternates between a few forms (say, a shadow
+    /// that moves now and then) is only compiled once for each.
     plans: Vec<Arc<Plan>>,
     compiled: u64,
     measure: Measurements,
@@ -39,20 +41,20 @@ pub struct Executor {
     begun: Option<Instant>,
 }
 
-/// A frame that was handed to the GPU.
+/// A frame that was submitted to the GPU.
 #[derive(Debug)]
 pub struct Frame {
-    /// Its number, from 1; its [`GraphReport`] has the same.
+    /// Its number, from 1, which its [`GraphReport`] has too.
     pub number: u64,
     /// What ran and why.
     pub plan: Arc<Plan>,
-    /// For waiting until it is done.
+    /// For waiting until the GPU has finished the frame.
     pub submission: wgpu::SubmissionIndex,
-    /// What it took on the CPU, if that was measured.
+    /// How long its stages took on the CPU, if that was measured.
     pub stages: Option<ExecutionStages>,
 }
 
-/// Times the stages of an execution.
+/// A stopwatch for the stages of an execution.
 struct Laps(Instant);
 
 impl Laps {
@@ -66,47 +68,48 @@ impl Laps {
 }
 
 impl Executor {
-    /// An executor that has run nothing yet, with [`Measurements::TIMES`].
+    /// Creates an executor that has run nothing yet, with [`Measurements::TIMES`].
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// What to measure from the next frame on.
+    /// Sets what to measure from the next frame on.
     pub fn set_measure(&mut self, measure: Measurements) {
         self.measure = measure;
     }
 
-    /// When work for the next frame began: its [`GraphReport::cpu_ms`] counts from then on and not from the call of
-    /// [`execute`](Self::execute).
+    /// Sets when work for the next frame began. Its [`GraphReport::cpu_ms`] counts from then on and not from the
+    /// call of [`execute`](Self::execute).
     pub fn begun_at(&mut self, begun: Instant) {
         self.begun = Some(begun);
     }
 
-    /// Whether to merge raster passes that draw into the same attachments (on from the start).
+    /// Sets whether to merge raster passes that draw into the same attachments (initially on).
     pub fn set_merging(&mut self, merge: bool) {
         self.keep_apart = !merge;
     }
 
-    /// Whether to look for NaN and Inf after every pass. For tests and for hunting: it merges nothing and costs a
-    /// read of every texture.
+    /// Sets whether to look for NaN and Inf after every pass. This is for tests and debugging: it disables merging
+    /// and reads every texture.
     pub fn enable_probe(&mut self, on: bool) {
         self.probing = on;
     }
 
-    /// What retained resources hold, for compiling a graph as [`execute`](Self::execute) would.
+    /// What is known about retained resources, for compiling a graph as [`execute`](Self::execute) would.
     #[must_use]
     pub fn history(&self) -> &History {
         &self.history
     }
 
-    /// Counts of GPU memory.
+    /// Returns counts of the GPU memory in use.
     #[must_use]
     pub fn pool_statistics(&self) -> PoolStatistics {
         self.pool.statistics()
     }
 
-    /// The plan of a graph; that of one of the last frames if it was declared the same, with the same results of earlier frames at hand.
+    /// Returns the plan of a graph. It is that of one of the last frames if the same was declared then, with the
+    /// same knowledge of earlier frames.
     ///
     /// # Errors
     /// The first fault of the declaration.
@@ -129,16 +132,17 @@ impl Executor {
         Ok(plan)
     }
 
-    /// Plans compiled so far.
+    /// Number of plans compiled so far.
     #[must_use]
     pub fn compiled_plans(&self) -> u64 {
         self.compiled
     }
 
-    /// Compiles a graph, runs its passes and submits them.
+    /// Compiles a graph, runs its passes and submits their commands.
     ///
     /// # Errors
-    /// Faults of the graph, imports that are missing or not as declared, errors of passes. Then nothing is submitted.
+    /// Faults of the graph, imports that are missing or not as declared, and errors of passes. Nothing is submitted
+    /// then.
     pub fn execute(
         &mut self,
         device: &wgpu::Device,
@@ -149,7 +153,7 @@ impl Executor {
         self.execute_with(device, queue, graph, imports, &mut ())
     }
 
-    /// [`Executor::execute`] of a graph whose passes share something: `user` is lent to one after the other.
+    /// [`Executor::execute`] for a graph whose passes share state: `user` is lent to one after the other.
     ///
     /// # Errors
     /// As [`Executor::execute`].
@@ -214,13 +218,13 @@ impl Executor {
         Ok(Frame { number: self.frame, plan, submission, stages: self.measure.cpu.then_some(stages) })
     }
 
-    /// The newest report that has arrived; does not wait. In a window it is some frames old.
+    /// Returns the newest report that has arrived, without waiting. In a window it is a few frames old.
     #[must_use]
     pub fn latest_report(&self) -> Option<&GraphReport> {
         self.report.as_ref()
     }
 
-    /// Waits for the GPU to finish and answers with the last frame's report; `None` if no frame ran.
+    /// Waits for the GPU to finish and returns the last frame's report; `None` if no frame has run.
     ///
     /// # Errors
     /// [`RunError::Wait`] if the device was lost.
@@ -237,7 +241,7 @@ impl Executor {
         Ok(self.report.as_ref())
     }
 
-    /// A texture that the last frame exported.
+    /// Returns a texture that the last frame exported.
     #[must_use]
     pub fn exported_texture(&self, name: &str) -> Option<&wgpu::Texture> {
         self.exported.iter().find_map(|(held, object)| match object {
@@ -246,7 +250,7 @@ impl Executor {
         })
     }
 
-    /// A buffer that the last frame exported.
+    /// Returns a buffer that the last frame exported.
     #[must_use]
     pub fn exported_buffer(&self, name: &str) -> Option<&wgpu::Buffer> {
         self.exported.iter().find_map(|(held, object)| match object {
@@ -259,14 +263,14 @@ impl Executor {
         if !self.ring.is_waiting() {
             return;
         }
-        // A lost device shows in the maps, whose callbacks then tell of failure.
+        // The callbacks of the buffer maps report a lost device.
         let _ = device.poll(wgpu::PollType::Poll);
         if let Some(report) = self.ring.collect(f64::from(queue.get_timestamp_period())) {
             self.report = Some(report);
         }
     }
 
-    /// The GPU objects of all resources that this frame uses, with a view of every part that is used.
+    /// Returns the GPU objects of the resources of this frame, with views of all parts that are used.
     fn objects(
         &mut self,
         device: &wgpu::Device,
@@ -308,7 +312,7 @@ impl Executor {
             let shape = &plan.resources[index].shape;
             match declared.origin {
                 Origin::Transient => {}
-                // Kept even if no pass uses it in this frame, since last frame's content may be wanted again.
+                // Kept even if no pass uses it in this frame, since last frame's content may be needed again.
                 Origin::Retained => {
                     let (object, fresh) = self.pool.retained(device, &declared.name, shape, self.frame)?;
                     objects[index] = Some(prepare(object, index));
@@ -326,7 +330,7 @@ impl Executor {
         Ok(objects)
     }
 
-    /// After a frame was submitted: what is known now.
+    /// Updates the state after a frame was submitted.
     fn keep(&mut self, plan: &Plan, objects: Vec<Option<GpuObject>>) {
         self.history = plan.after.clone();
         for name in self.pool.trim(self.frame) {
@@ -365,7 +369,8 @@ mod tests {
             assert_eq!(plan.running().count(), if frame % 2 == 0 { 2 } else { 1 });
         }
         assert_eq!(executor.compiled_plans(), 2);
-        // More than are kept, again and again: none of them is, and no more than that are held.
+        // With more graphs than plans are kept, used in turn, each has to be compiled every time, and no more than
+        // that are kept.
         for frame in 0..30 {
             executor.plan(&graph(true, 10 + frame % 10)).unwrap();
         }

@@ -1,17 +1,18 @@
 //! Handles: names for one *version* of a texture or a buffer of one graph.
 //!
-//! Reading takes `&handle`. Writing takes `&mut handle` and moves it on to the version that the write makes, so that
-//! whoever reads through it afterwards reads what was written. A handle owns nothing: it is an index, free to copy. A
-//! copy made before a write still names the older version; writing through such a stale copy is the error
-//! [`TwoWriters`](crate::GraphError::TwoWriters). This is not the GPU object: a pass gets that from its context.
+//! Reading takes `&handle`. Writing takes `&mut handle` and advances it to the version that the write makes, so
+//! that later reads through it see what was written. A handle owns nothing: it is an index and free to copy. A copy
+//! made before a write still names the older version, and writing through such a stale copy is the error
+//! [`TwoWriters`](crate::GraphError::TwoWriters). A handle is not the GPU object, which a pass gets from its
+//! context.
 
 use std::marker::PhantomData;
 
-/// The kind of resource that a [`BufferHandle`] names.
+/// The resource kind of a [`BufferHandle`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Buffer {}
 
-/// The kind of resource that a [`TextureHandle`] names.
+/// The resource kind of a [`TextureHandle`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Texture {}
 
@@ -34,14 +35,14 @@ impl<K> Handle<K> {
         Self { graph, resource, version: 0, kind: PhantomData }
     }
 
-    /// How many writes lie between the resource's declaration and this handle.
+    /// Returns the number of writes between the resource's declaration and this handle.
     #[must_use]
     pub fn version(&self) -> u32 {
         self.version
     }
 }
 
-// Written out because a derive would ask the same of `K`, which is only a mark.
+// Written by hand, because a derive would require the same traits of `K`, which is only a marker.
 impl<K> Clone for Handle<K> {
     fn clone(&self) -> Self {
         *self

@@ -1,4 +1,4 @@
-//! A render graph that compiles without a device, explains itself and measures itself.
+//! A render graph that is compiled without a device, explains its plan, and measures its passes.
 //!
 //! ```text
 //!   Graph ── declare ──► compile ──────► Plan ──► explain: text, JSON, DOT
@@ -9,12 +9,13 @@
 //!                                      queries, probe        first NaN
 //! ```
 //!
-//! A pass reads through `&handle` and writes through `&mut handle`, which moves the handle on to a new version. It says
-//! what it *calls for*; without that it is skipped, and what it would have written stays as it was. What nothing reads
-//! is culled. What is retained and would come out the same is left. Passes that draw into the same attachments share one
-//! wgpu render pass, and transients share memory. The plan says all this, with the reasons.
+//! A pass reads through `&handle` and writes through `&mut handle`, which advances the handle to a new version. It
+//! states what it *calls for*; if that is missing, the pass is skipped, and the resources that it would have
+//! written keep their previous content. Passes whose results nothing reads are culled. Passes whose results are
+//! retained and would come out the same do not run. Passes that draw into the same attachments share one wgpu
+//! render pass, and transient resources share memory. The plan records all of this with the reasons.
 //!
-//! This crate knows nothing of lights, meshes or scenes.
+//! This crate knows nothing about lights, meshes or scenes.
 //!
 //! ```
 //! use lumbre_graph::{Graph, LoadOp, TextureDescriptor, wgpu};
@@ -35,7 +36,7 @@
 //! # Ok::<(), Box<lumbre_graph::GraphError>>(())
 //! ```
 //!
-//! `examples/sobel.rs` runs a graph on a device, with a bind group over what a pass before has drawn.
+//! `examples/sobel.rs` runs a graph on a device, with a bind group for the texture that an earlier pass has drawn.
 
 mod access;
 mod compile;

@@ -1,6 +1,6 @@
-//! The nearest name to a misspelt one, by edit distance (Levenshtein). Nothing but text.
+//! Finds the nearest name to a misspelt one, by edit distance (Levenshtein).
 
-/// The candidate with the fewest edits from `name`, if these are at most a third of its letters (at least one).
+/// Returns the candidate with the fewest edits from `name`, if they are at most a third of its letters (or one).
 pub(crate) fn nearest<'n>(name: &str, candidates: impl Iterator<Item = &'n str>) -> Option<&'n str> {
     let limit = (name.chars().count() / 3).max(1);
     candidates
@@ -10,7 +10,8 @@ pub(crate) fn nearest<'n>(name: &str, candidates: impl Iterator<Item = &'n str>)
         .map(|(_, candidate)| candidate)
 }
 
-/// Insertions, deletions and replacements that turn `a` into `b`, one row of the table at a time.
+/// Returns the number of insertions, deletions and replacements that turn `a` into `b`, computed one row of the
+/// table at a time.
 fn edits(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

@@ -1,19 +1,19 @@
-//! The plan: what compiling a graph answers with. Data only; it explains itself in [`explain`](crate::explain) and is
-//! carried out by [`run`](crate::run).
+//! The plan: the result of compiling a graph. It is data only: [`explain`](crate::explain) explains it, and
+//! [`run`](crate::run) executes it.
 
 use crate::access::Part;
 use crate::declaration::Declarations;
 use crate::history::History;
 use crate::resource::{Label, Shape};
 
-/// Choices of how to compile.
+/// Options for compiling a graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CompileOptions {
-    /// Make one wgpu pass of raster passes in a row that draw into the same attachments. Off, each has its own, and
-    /// so its own time where timestamps can not be taken inside passes.
+    /// Combine consecutive raster passes that draw into the same attachments into one wgpu pass. Without it each
+    /// pass has its own wgpu pass, and therefore its own time even where timestamps cannot be taken inside passes.
     pub merge: bool,
-    /// Keep all that is drawn so that [`FiniteProbe`](crate::FiniteProbe) can look at it after each pass. Merges
-    /// nothing.
+    /// Keep everything that is drawn, so that [`FiniteProbe`](crate::FiniteProbe) can inspect it after each pass.
+    /// This disables merging.
     pub probe: bool,
 }
 
@@ -23,16 +23,17 @@ impl Default for CompileOptions {
     }
 }
 
-/// What becomes of a pass, and why.
+/// What happens to a pass, and why.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
 pub enum Status {
     /// It runs.
     Runs {
-        /// Who wants what it writes, or its side effect.
+        /// What needs its results, or its side effect.
         reason: String,
     },
-    /// What it calls for is not there. What it would have written is left as it was.
+    /// Something that it calls for is missing. The resources that it would have written keep their previous
+    /// content.
     Skipped {
         /// "the scene has no …"
         reason: String,
@@ -42,7 +43,7 @@ pub enum Status {
         /// "nothing reads …"
         reason: String,
     },
-    /// What it writes is retained and holds already what it would write.
+    /// What it writes is retained and already has the content that it would write.
     Unchanged {
         /// "same inputs as last frame …"
         reason: String,
@@ -50,13 +51,13 @@ pub enum Status {
 }
 
 impl Status {
-    /// Whether the pass runs.
+    /// Returns true if the pass runs.
     #[must_use]
     pub fn runs(&self) -> bool {
         matches!(self, Self::Runs { .. })
     }
 
-    /// The status in one word.
+    /// Returns the status in one word.
     #[must_use]
     pub fn word(&self) -> &'static str {
         match self {
@@ -67,7 +68,7 @@ impl Status {
         }
     }
 
-    /// Why.
+    /// Returns why.
     #[must_use]
     pub fn reason(&self) -> &str {
         match self {
@@ -79,7 +80,7 @@ impl Status {
     }
 }
 
-/// Where an attachment lies.
+/// The subresource of an attachment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Target {
     pub resource: usize,
@@ -89,7 +90,7 @@ pub(crate) struct Target {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ColorTarget {
     pub target: Target,
-    /// The value to clear to; `None` loads.
+    /// The value to clear to; `None` means load.
     pub clear: Option<wgpu::Color>,
     pub store: bool,
     pub resolve: Option<Target>,
@@ -99,12 +100,12 @@ pub(crate) struct ColorTarget {
 pub(crate) struct DepthTarget {
     pub target: Target,
     pub read_only: bool,
-    /// The value to clear to; `None` loads.
+    /// The value to clear to; `None` means load.
     pub clear: Option<f32>,
     pub store: bool,
 }
 
-/// One wgpu pass, or one stretch of the encoder, that carries out one or more passes of the graph.
+/// One wgpu pass, or one sequence of commands on the encoder, that executes one or more passes of the graph.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Step {
     pub passes: Vec<usize>,
@@ -112,7 +113,7 @@ pub(crate) struct Step {
     pub depth: Option<DepthTarget>,
 }
 
-/// A piece of memory that the pool provides for the whole frame, and that resources take turns in.
+/// A piece of memory that the pool provides for the whole frame and that several resources use in turn.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Slot {
     /// With the usages of all its resources.
@@ -120,27 +121,27 @@ pub(crate) struct Slot {
     pub resources: Vec<usize>,
 }
 
-/// How a resource lives in this frame.
+/// How a resource is realized in this frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ResourcePlan {
     /// The declared shape with the usages that the passes need.
     pub shape: Shape,
-    /// First and last step that use it; `None` if none does.
+    /// The first and last step that use it; `None` if none does.
     pub lifetime: Option<[usize; 2]>,
-    /// The slot of a transient that is used.
+    /// The slot, if it is a transient resource that is used.
     pub slot: Option<usize>,
 }
 
-/// Bytes of the resources that the graph makes by itself.
+/// Bytes of the resources that the graph creates itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Memory {
     /// Largest sum of the transients alive in one step: no allocator could do with less.
     pub peak_bytes: u64,
-    /// What the pool provides: one piece for each set of transients that take turns.
+    /// Bytes that the pool provides: one piece of memory for each set of transients that use it in turn.
     pub pool_bytes: u64,
-    /// What the transients would take if none shared memory.
+    /// Bytes that the transients would need without sharing.
     pub unshared_bytes: u64,
-    /// What is kept from frame to frame.
+    /// Bytes kept from frame to frame.
     pub retained_bytes: u64,
 }
 
@@ -149,25 +150,25 @@ pub struct Memory {
 pub struct Plan {
     pub(crate) declarations: Declarations,
     pub(crate) options: CompileOptions,
-    /// What was known of earlier frames when this was compiled.
+    /// What was known about earlier frames when this was compiled.
     pub(crate) before: History,
-    /// What will be known after this ran.
+    /// What will be known after this has run.
     pub(crate) after: History,
     /// All passes in an order that respects every dependency.
     pub(crate) order: Vec<usize>,
     pub(crate) status: Vec<Status>,
     pub(crate) steps: Vec<Step>,
     pub(crate) resources: Vec<ResourcePlan>,
-    /// Per resource and version: the version that stands for it, since skipped passes write nothing.
+    /// Per resource and version, the version whose content it has, as skipped passes write nothing.
     pub(crate) effective: Vec<Vec<u32>>,
-    /// Per resource: whether its version 0 holds anything.
+    /// Per resource, whether its version 0 has any content.
     pub(crate) initial: Vec<bool>,
     pub(crate) slots: Vec<Slot>,
     pub(crate) memory: Memory,
 }
 
 impl Plan {
-    /// What becomes of the pass of this name; `None` if there is no such pass.
+    /// Returns what happens to the pass with this name; `None` if there is no such pass.
     #[must_use]
     pub fn status(&self, pass: &str) -> Option<&Status> {
         self.declarations.passes.iter().position(|declared| declared.name == pass).map(|i| &self.status[i])
@@ -178,39 +179,41 @@ impl Plan {
         self.steps.iter().flat_map(|step| &step.passes).map(|&pass| &*self.declarations.passes[pass].name)
     }
 
-    /// The names of the passes of each wgpu pass, in order: those of one entry were merged.
+    /// The names of the passes of each wgpu pass, in order; passes in one entry were merged.
     pub fn groups(&self) -> impl Iterator<Item = Vec<&str>> {
         self.steps
             .iter()
             .map(|step| step.passes.iter().map(|&pass| &*self.declarations.passes[pass].name).collect())
     }
 
-    /// Bytes of the resources that the graph makes by itself.
+    /// Returns the bytes of the resources that the graph creates itself.
     #[must_use]
     pub fn memory(&self) -> Memory {
         self.memory
     }
 
-    /// What earlier frames' results will be known to hold once this ran; for compiling the next frame without a device.
+    /// Returns what will be known about retained resources once this plan has run. It is used to compile the next
+    /// frame without a device.
     #[must_use]
     pub fn history(&self) -> &History {
         &self.after
     }
 
-    /// The index of the memory that a transient lives in; resources of the same index take turns. `None` for others
-    /// and for those that no running pass uses.
+    /// Returns the index of the memory that a transient resource uses; resources with the same index use it in
+    /// turn. `None` for other resources and for those that no running pass uses.
     #[must_use]
     pub fn slot(&self, resource: &str) -> Option<usize> {
         self.resource_index(resource).and_then(|index| self.resources[index].slot)
     }
 
-    /// First and last group (index into [`groups`](Self::groups)) that use a resource.
+    /// Returns the first and last group (indices into [`groups`](Self::groups)) that use a resource.
     #[must_use]
     pub fn lifetime(&self, resource: &str) -> Option<[usize; 2]> {
         self.resource_index(resource).and_then(|index| self.resources[index].lifetime)
     }
 
-    /// This plan, if none of it is carried out again: each pass that would run is [`Unchanged`](Status::Unchanged) for this reason.
+    /// Returns this plan as it is if none of it is executed again: each pass that would run is
+    /// [`Unchanged`](Status::Unchanged) for this reason.
     #[must_use]
     pub fn unchanged(&self, reason: &str) -> Self {
         let mut plan = self.clone();

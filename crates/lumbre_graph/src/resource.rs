@@ -1,4 +1,5 @@
-//! What a resource is: its shape, where it comes from, and how many bytes it takes. Not the GPU object.
+//! What a resource is: its shape, where it comes from, and its size in bytes. The GPU objects are made by the
+//! executor.
 
 use std::borrow::Cow;
 
@@ -7,10 +8,10 @@ use crate::site::Site;
 /// A name of a pass or a resource. A literal costs no allocation.
 pub type Label = Cow<'static, str>;
 
-/// The shape of a texture. How it is used is not said here: the graph infers that from the passes.
+/// The shape of a texture. The graph infers its usage from the passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TextureDescriptor {
-    /// Width and height in texels; depth in texels of a 3D texture, else the number of array layers.
+    /// Width and height in texels; the depth in texels of a 3D texture, otherwise the number of array layers.
     pub size: wgpu::Extent3d,
     /// Texel format.
     pub format: wgpu::TextureFormat,
@@ -20,13 +21,14 @@ pub struct TextureDescriptor {
     pub mip_level_count: u32,
     /// 2D (also arrays and cubes) or 3D.
     pub dimension: wgpu::TextureDimension,
-    /// Of a texture that the graph makes: usages to allow beyond the inferred ones. Of an imported one: the usages it
-    /// was made with, against which the passes are checked; empty means unknown until it is bound.
+    /// For a texture that the graph creates: usages to allow in addition to the inferred ones. For an imported
+    /// texture: the usages that it was created with, against which the passes are checked; empty means that they
+    /// are unknown until it is bound.
     pub usage: wgpu::TextureUsages,
 }
 
 impl TextureDescriptor {
-    /// A 2D texture of one layer, one mip level and one sample.
+    /// Creates the shape of a 2D texture with one layer, one mip level and one sample.
     #[must_use]
     pub fn new_2d(width: u32, height: u32, format: wgpu::TextureFormat) -> Self {
         Self {
@@ -60,14 +62,14 @@ impl TextureDescriptor {
         self
     }
 
-    /// The same with these usages besides the inferred ones (or, imported, with just these known).
+    /// The same with these usages in addition to the inferred ones (or, if imported, as the only known ones).
     #[must_use]
     pub fn usage(mut self, usage: wgpu::TextureUsages) -> Self {
         self.usage = usage;
         self
     }
 
-    /// Size in bytes, all mip levels, layers and samples counted, without the driver's padding.
+    /// Returns the size in bytes of all mip levels, layers and samples, without the driver's padding.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         (0..self.mip_level_count.min(32)).fold(0_u64, |sum, level| {
@@ -76,7 +78,7 @@ impl TextureDescriptor {
         })
     }
 
-    /// Size of one mip level; layers are kept, the depth of a 3D texture shrinks.
+    /// Returns the size of one mip level. Array layers are kept, while the depth of a 3D texture shrinks.
     #[must_use]
     pub fn mip_size(&self, level: u32) -> wgpu::Extent3d {
         let shrink = |length: u32| length.checked_shr(level).unwrap_or(0).max(1);
@@ -90,13 +92,13 @@ impl TextureDescriptor {
         }
     }
 
-    /// Number of array layers (1 for a 3D texture).
+    /// Returns the number of array layers (1 for a 3D texture).
     #[must_use]
     pub fn layer_count(&self) -> u32 {
         if self.dimension == wgpu::TextureDimension::D3 { 1 } else { self.size.depth_or_array_layers }
     }
 
-    /// Whether a texture of this shape can hold NaN or Inf where the probe can see it.
+    /// Returns true if a texture of this shape can hold NaN or Inf and the probe can read it.
     pub(crate) fn can_be_probed(&self) -> bool {
         use wgpu::TextureFormat as Format;
         let float = matches!(
@@ -112,13 +114,13 @@ impl TextureDescriptor {
         float && self.dimension == wgpu::TextureDimension::D2
     }
 
-    /// Whether the texture has a single part, so that clearing an attachment overwrites all of it.
+    /// Returns true if the texture has a single part, so that clearing it as an attachment overwrites all of it.
     pub(crate) fn is_one_part(&self) -> bool {
         self.mip_level_count == 1 && self.size.depth_or_array_layers == 1
     }
 }
 
-/// The shape of a buffer. How it is used is inferred from the passes.
+/// The shape of a buffer. The graph infers its usage from the passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BufferDescriptor {
     /// Size in bytes, a multiple of 4.
@@ -134,7 +136,7 @@ impl BufferDescriptor {
         Self { size, usage: wgpu::BufferUsages::empty() }
     }
 
-    /// The same with these usages besides the inferred ones (or, imported, with just these known).
+    /// The same with these usages in addition to the inferred ones (or, if imported, as the only known ones).
     #[must_use]
     pub fn usage(mut self, usage: wgpu::BufferUsages) -> Self {
         self.usage = usage;
@@ -146,7 +148,7 @@ impl BufferDescriptor {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
-    /// The pool lends it for part of one frame; its memory serves others in the rest.
+    /// The pool provides it for part of one frame, and its memory serves other resources during the rest.
     Transient,
     /// The executor keeps it from frame to frame under its name.
     Retained,
@@ -164,7 +166,8 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Whether a resource made with this shape can be used as `asked`: all the same, and at least the usages.
+    /// Returns true if a resource created with this shape can serve as `asked`: everything is equal and it has at
+    /// least those usages.
     pub(crate) fn serves(&self, asked: &Self) -> bool {
         let usages = match (self, asked) {
             (Self::Texture(made), Self::Texture(asked)) => made.usage.contains(asked.usage),
@@ -190,7 +193,7 @@ impl Shape {
         }
     }
 
-    /// The shape without usages: two resources that agree in it can share memory.
+    /// The shape without its usages: resources for which it is equal can share memory.
     pub(crate) fn without_usage(&self) -> Self {
         match *self {
             Self::Texture(texture) => Self::Texture(texture.usage(wgpu::TextureUsages::empty())),
@@ -205,15 +208,15 @@ pub(crate) struct ResourceDeclaration {
     pub name: Label,
     pub shape: Shape,
     pub origin: Origin,
-    /// Pass that made version `i + 1`.
+    /// The pass that makes version `i + 1`.
     pub writers: Vec<usize>,
     pub exported: Option<u32>,
-    /// What is known of an imported resource's content, see `Graph::fingerprint`.
+    /// Fingerprint of an imported resource's content, see `Graph::fingerprint`.
     pub fingerprint: Option<u64>,
     pub site: Site,
 }
 
-/// `TextureUsages(COPY_SRC | COPY_DST)` without the type's name.
+/// Formats usages without the type's name: `COPY_SRC | COPY_DST`.
 pub(crate) fn flags(usage: &impl std::fmt::Debug) -> String {
     let text = format!("{usage:?}");
     match text.split_once('(') {

@@ -1,26 +1,26 @@
-//! Where in the caller's source something was declared, so that an error can point at both declarations.
+//! Where in the caller's source something was declared, so that an error can point to both declarations.
 
 use std::fmt;
 use std::panic::Location;
 
-/// A place in source: file, line and column of the call that declared a pass or a resource.
+/// A source location: file, line and column of the call that declared a pass or a resource.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Site(&'static Location<'static>);
 
 impl Site {
-    /// The place that called the `#[track_caller]` function which calls this.
+    /// The location that called the `#[track_caller]` function that calls this.
     #[track_caller]
     pub(crate) fn caller() -> Self {
         Self(Location::caller())
     }
 
-    /// Line in the file, from 1.
+    /// Line in the file, starting from 1.
     #[must_use]
     pub fn line(&self) -> u32 {
         self.0.line()
     }
 
-    /// File as the compiler names it.
+    /// File name as the compiler has it.
     #[must_use]
     pub fn file(&self) -> &'static str {
         self.0.file()

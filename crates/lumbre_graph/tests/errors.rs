@@ -1,4 +1,5 @@
-//! Each fault of a declaration is its own error, and names pass, resource and both declarations. No GPU.
+//! Checks that each fault of a declaration has its own error, which names the pass, the resource and both
+//! declarations. Needs no GPU.
 
 use lumbre_graph::wgpu::{Color, TextureFormat, TextureUsages};
 use lumbre_graph::*;
@@ -9,7 +10,7 @@ fn hdr() -> TextureDescriptor {
     TextureDescriptor::new_2d(64, 32, TextureFormat::Rgba16Float)
 }
 
-/// The error of a graph that `build` declares, as text, after checking its variant.
+/// Returns the error, as text, of a graph that `build` declares, after checking its variant.
 fn fault(build: impl FnOnce(&mut Graph<'_>), is: impl FnOnce(&GraphError) -> bool) -> String {
     let mut graph = Graph::new("test");
     build(&mut graph);
@@ -416,7 +417,7 @@ fn export_overwritten() {
 
 #[test]
 fn faults_do_not_depend_on_what_the_scene_holds() {
-    // A skipped pass with a fault is refused too: else the fault shows only on some levels.
+    // A skipped pass with a fault is rejected too; otherwise the fault would only show with some scenes.
     fault(
         |graph| {
             let depth = graph.texture("depth", hdr());

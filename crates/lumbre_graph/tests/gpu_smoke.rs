@@ -1,4 +1,5 @@
-//! Running graphs on a device; the only tests of this crate that need one. A software rasterizer will do.
+//! Runs graphs on a device. These are the only tests of this crate that need one; a software rasterizer is
+//! sufficient.
 
 use lumbre_graph::wgpu;
 use lumbre_graph::wgpu::{Color, Features, TextureFormat, TextureUsages};
@@ -31,7 +32,7 @@ const TIMES: Features = Features::TIMESTAMP_QUERY
     .union(Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
     .union(Features::PIPELINE_STATISTICS_QUERY);
 
-/// Draws one triangle over the whole target with a fragment shader.
+/// A pipeline that draws one triangle covering the whole target with a fragment shader.
 fn pipeline(
     device: &wgpu::Device,
     fragment: &str,
@@ -83,7 +84,7 @@ fn pipeline(
 const SIDE: u32 = 64;
 const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 
-/// A buffer to read a SIDE x SIDE texture of FORMAT back through: 1024 bytes a row, a multiple of 256.
+/// A buffer for reading back a SIDE x SIDE texture of FORMAT, with 1024 bytes per row, a multiple of 256.
 fn readback(device: &wgpu::Device) -> wgpu::Buffer {
     device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("readback"),
@@ -127,7 +128,7 @@ fn copy_out<'a, User>(graph: &mut Graph<'a, User>, from: &TextureHandle) {
     });
 }
 
-/// Two passes that add to one target, and the copy of it.
+/// Two passes that add to one target, and a copy of the result.
 fn adding<'a>(
     first: &'a wgpu::RenderPipeline,
     second: &'a wgpu::RenderPipeline,
@@ -164,7 +165,7 @@ fn merged_passes_draw_and_are_measured() {
     assert_eq!(frame.plan.groups().collect::<Vec<_>>(), [vec!["first", "second"], vec!["read back"]]);
     for (index, texel) in read(&gpu, &buffer).into_iter().enumerate() {
         let (x, y) = (index as u32 % SIDE, index as u32 / SIDE);
-        // Whole numbers and halves are exact in f32, sums of a few of them too.
+        // Whole numbers and halves are exact in f32, and so are sums of a few of them.
         assert_eq!(texel, [x as f32, 0.5 + y as f32, 0.25, 1.0], "texel {x} {y}");
     }
 
@@ -180,7 +181,7 @@ fn merged_passes_draw_and_are_measured() {
     let cpu = report.cpu_ms.expect("asked for");
     let stages = frame.stages.expect("asked for");
     assert!(stages.recording_ms > 0.0 && stages.submission_ms > 0.0, "{stages:?}");
-    // All but the last stage lie before the end of the submission, one after the other.
+    // All but the last stage are before the end of the submission, one after the other.
     assert!(stages.total_ms() - stages.keeping_ms <= cpu * (1.0 + 1e-9), "{stages:?} within {cpu} ms");
     let passes: f64 = report.passes.iter().filter_map(|pass| pass.cpu_ms).sum();
     assert!(passes <= stages.recording_ms, "{passes} ms of passes in {stages:?}");
@@ -193,7 +194,7 @@ fn merged_passes_draw_and_are_measured() {
     for pass in &report.passes[..2] {
         let counted = pass.invocations.expect("asked for");
         assert_eq!(counted.vertex, 3, "one triangle");
-        // A rasterizer that works in quads or tiles may shade a border more than once.
+        // A rasterizer that works in quads or tiles may shade border fragments more than once.
         assert!(
             counted.fragment >= u64::from(SIDE * SIDE) && counted.fragment < u64::from(4 * SIDE * SIDE),
             "{counted:?}"
@@ -241,7 +242,8 @@ fn memory_and_plan_are_used_again() {
 #[test]
 fn the_probe_finds_the_first_pass_and_texel() {
     let gpu = gpu(Features::empty());
-    // Halves: blendable everywhere. NaN at (13, 7) and (40, 7) and (2, 50); the first in reading order is (13, 7).
+    // Half floats are blendable everywhere. There is NaN at (13, 7), (40, 7) and (2, 50); in reading order (13, 7)
+    // is first.
     let format = TextureFormat::Rgba16Float;
     let nan = "let p = vec2<u32>(at.xy);
         let hit = all(p == vec2(13u, 7u)) || all(p == vec2(40u, 7u)) || all(p == vec2(2u, 50u));
@@ -280,13 +282,14 @@ fn the_probe_finds_the_first_pass_and_texel() {
         assert_eq!((&*found.pass, &*found.resource), ("dirty", "target"));
         assert_eq!((found.x, found.y, found.sample, found.layer, found.mip), (13, 7, 0, 0, 0));
         assert!(found.value[1].is_nan() || found.value[1].is_infinite(), "{found:?}");
-        // `before` drew 1 into each channel, `dirty` adds to that.
+        // `before` drew 1 into each channel, and `dirty` adds to that.
         assert_eq!([found.value[0], found.value[2]], [2.0, 4.0]);
         assert_eq!(look(build(["before", "after", "again"])), None, "a clean frame after a dirty one");
     }
 }
 
-/// The device is everybody's: a thread that polls it takes the answers for all, and may stand still before it hands them out.
+/// The device is shared: a thread that polls it takes the callbacks of all threads, and may be delayed before it
+/// runs them.
 #[test]
 fn measurements_arrive_through_another_threads_hands() {
     let gpu = gpu(TIMES | Features::FLOAT32_BLENDABLE);
@@ -299,7 +302,7 @@ fn measurements_arrive_through_another_threads_hands() {
     let (polled, taken) = std::sync::mpsc::channel();
     for number in 1..=4 {
         let mut ran = Vec::new();
-        // A frame that waits for its turn on the GPU, so that the answers come together.
+        // A frame that has to wait for the GPU, so that its callbacks come together with the others.
         executor
             .execute_with(&gpu.device, &gpu.queue, adding(&draw, &draw), &imports, &mut ran)
             .expect("the frame runs");
@@ -348,7 +351,7 @@ fn retained_content_is_kept_and_not_drawn_again() {
         (ran, read(&gpu, &buffer)[0][0])
     };
     assert_eq!(run(1, &seven), (true, 7.0));
-    // The fingerprint says that nothing changed, so the other pipeline must not be seen.
+    // The fingerprint states that nothing changed, so the other pipeline must not run.
     assert_eq!(run(1, &nine), (false, 7.0));
     assert_eq!(run(2, &nine), (true, 9.0));
     assert_eq!(run(2, &seven), (false, 9.0));
@@ -415,7 +418,8 @@ fn a_multisampled_chain_resolves_at_its_end() {
     gpu.device.poll(wgpu::PollType::wait_indefinitely()).expect("the GPU finishes");
     let bytes = result.get_mapped_range(..).expect("mapped");
     let halves: &[u16] = bytemuck::cast_slice(&bytes);
-    // Cleared to (1, 0, 0, 0), then twice a quarter: 1.5 and 0.5, which halves hold exactly (0x3e00, 0x3800).
+    // Cleared to (1, 0, 0, 0) and then drawn twice with a quarter: 1.5 and 0.5, which are exact in half floats
+    // (0x3e00, 0x3800).
     assert!(halves.chunks(4).all(|texel| texel == [0x3e00, 0x3800, 0x3800, 0x3800]));
 }
 

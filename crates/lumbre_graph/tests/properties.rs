@@ -1,4 +1,4 @@
-//! Properties of random graphs: order, culling, memory. And what compiling costs. No GPU.
+//! Properties of random graphs: order, culling and memory; and the cost of compiling. Needs no GPU.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use lumbre_graph::wgpu::{Color, TextureFormat};
 use lumbre_graph::*;
 use proptest::prelude::*;
 
-/// One random pass: which resources it reads and writes, and what else there is to it.
+/// One random pass: the resources that it reads and writes, and its other properties.
 #[derive(Clone, Debug)]
 struct RandomPass {
     reads: Vec<usize>,
@@ -49,11 +49,11 @@ fn random_graph() -> impl Strategy<Value = RandomGraph> {
     })
 }
 
-/// What a pass reads and writes: resource and version.
+/// The resources and versions that a pass reads and writes.
 #[derive(Clone, Debug, Default)]
 struct Uses {
     reads: Vec<(usize, u32)>,
-    /// Resource and version written, and the version below if it is kept.
+    /// Resource and version written, and whether the content of the version below is kept.
     write: Option<(usize, u32, bool)>,
     side_effect: bool,
     called_for: bool,
@@ -63,7 +63,8 @@ fn name(resource: usize) -> String {
     format!("resource {resource}")
 }
 
-/// Declares the graph, leaving out reads of what was not written, so that it is valid; and a record to judge by.
+/// Declares the graph, leaving out reads of resources that were not written so that it is valid, and returns a
+/// record for checking the plan.
 fn declare(random: &RandomGraph) -> (Graph<'static>, Vec<Uses>) {
     let mut graph = Graph::new("random");
     let mut handles: Vec<TextureHandle> = random
@@ -101,8 +102,9 @@ fn declare(random: &RandomGraph) -> (Graph<'static>, Vec<Uses>) {
     (graph, uses)
 }
 
-/// An independent answer to which passes run: run everything in order of declaration over sets of passes ("who had a
-/// hand in what this texture holds"), and see who had a hand in what is exported or has a side effect.
+/// An independent computation of which passes run. It goes through all passes in order of declaration and tracks,
+/// for each texture, the set of passes that contributed to its content; a pass is needed if it contributed to
+/// anything that is exported or has a side effect.
 fn needed(random: &RandomGraph, uses: &[Uses]) -> Vec<bool> {
     let mut held: HashMap<(usize, u32), Vec<usize>> = HashMap::new();
     let mut last: Vec<u32> = vec![0; random.sizes.len()];
@@ -137,7 +139,7 @@ fn needed(random: &RandomGraph, uses: &[Uses]) -> Vec<bool> {
 }
 
 proptest! {
-    // The order of shrinking and the seeds are proptest's; the seed is fixed so that a run can be repeated.
+    // The seed is fixed so that a run can be repeated.
     #![proptest_config(ProptestConfig {
         cases: 2000,
         rng_seed: prop::test_runner::RngSeed::Fixed(20),
@@ -190,7 +192,7 @@ proptest! {
                 passes.into_iter().map(move |pass| (pass.to_owned(), group)).collect::<Vec<_>>()
             })
             .collect();
-        // Every use lies in its resource's lifetime.
+        // Every use is within its resource's lifetime.
         for (index, pass) in uses.iter().enumerate() {
             let Some(&group) = group_of.get(&format!("pass {index}")) else { continue };
             let (resource, ..) = pass.write.expect("every random pass writes");
@@ -198,7 +200,7 @@ proptest! {
             prop_assert!(first <= group && group <= last);
             prop_assert!(plan.slot(&name(resource)).is_some());
         }
-        // Two lifetimes in one slot do not overlap, and the resources are of one size.
+        // Two lifetimes in one slot do not overlap, and their resources have the same size.
         for a in 0..random.sizes.len() {
             for b in 0..a {
                 let (Some(slot_a), Some(slot_b)) = (plan.slot(&name(a)), plan.slot(&name(b))) else { continue };
@@ -254,7 +256,7 @@ fn a_chain_of_filters_takes_turns_in_two_slots() {
     assert_eq!(plan.memory(), expected);
 }
 
-/// A frame of ten passes, as the renderer builds one.
+/// A frame of ten passes like those of the renderer.
 fn ten_passes() -> Graph<'static> {
     let mut graph = Graph::new("frame");
     let shape = TextureDescriptor::new_2d(1280, 720, TextureFormat::Rgba16Float);
@@ -283,10 +285,10 @@ fn ten_passes() -> Graph<'static> {
     graph
 }
 
-/// Prints what ten passes cost (the aim is 50 microseconds in a release build); times are never asserted.
+/// Prints the cost of ten passes (the aim is 50 microseconds in a release build); times are never asserted.
 #[test]
 fn ten_passes_compile_and_six_of_them_merge() {
-    // The best of many: the machine may do other things meanwhile.
+    // The best of many runs, as the machine may be busy meanwhile.
     let best = |work: &dyn Fn()| {
         (0..200)
             .map(|_| {
@@ -302,6 +304,6 @@ fn ten_passes_compile_and_six_of_them_merge() {
     eprintln!("ten passes: declare {declare:?}, declare and compile {both:?}");
     let plan = ten_passes().compile().expect("valid");
     assert_eq!(plan.running().count(), 10);
-    // The six that draw into the same attachments are one wgpu pass.
+    // The six passes that draw into the same attachments are one wgpu pass.
     assert_eq!(plan.groups().next().map(|group| group.len()), Some(6));
 }

@@ -1,6 +1,6 @@
-//! Leaving unchanged passes out must not be seen. Random graphs run over several frames twice, on numbers in place of
-//! texels: once with fingerprints, so that passes may be left out, and once without. What the sinks see must be equal.
-//! No GPU.
+//! Leaving out unchanged passes must not change results. Random graphs run over several frames twice, with numbers
+//! in place of texels: once with fingerprints, so that passes may be left out, and once without. The sinks must see
+//! the same numbers in both. Needs no GPU.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -14,7 +14,7 @@ const RESOURCES: usize = 4;
 
 #[derive(Clone, Debug)]
 enum Write {
-    /// One layer, as an attachment: cleared, or cleared only if first.
+    /// One layer, as an attachment, which is cleared, or (if true) only cleared if it is the first write.
     Layer(u32, bool),
     /// All layers, as a storage texture.
     All,
@@ -27,7 +27,7 @@ struct RandomPass {
     write: Write,
 }
 
-/// Per pass: its fingerprint, and whether the scene has what it calls for.
+/// For each pass its fingerprint, and whether the scene has what it calls for.
 type RandomFrame = Vec<(u64, bool)>;
 
 fn random() -> impl Strategy<Value = (Vec<bool>, Vec<RandomPass>, Vec<RandomFrame>)> {
@@ -44,14 +44,14 @@ fn random() -> impl Strategy<Value = (Vec<bool>, Vec<RandomPass>, Vec<RandomFram
     })
 }
 
-/// Runs frames on numbers.
+/// Runs frames on numbers in place of texels.
 #[derive(Default)]
 struct Machine {
     fingerprints: bool,
     history: History,
-    /// What each layer of each retained resource holds.
+    /// The content of each layer of each resource.
     memory: HashMap<(usize, u32), u64>,
-    /// Passes run so far; makes stale transients different every time.
+    /// Number of passes run so far.
     ran: u64,
     left_out: u64,
 }
@@ -63,7 +63,7 @@ fn number(parts: impl Hash) -> u64 {
 }
 
 impl Machine {
-    /// What the sink of each resource sees in this frame.
+    /// Returns what the sink of each resource sees in this frame.
     fn frame(&mut self, retained: &[bool], passes: &[RandomPass], frame: &RandomFrame) -> Vec<Vec<u64>> {
         let mut graph = Graph::new("random");
         let shape = TextureDescriptor::new_2d(8, 8, TextureFormat::Rgba16Float).layers(LAYERS);
@@ -73,7 +73,8 @@ impl Machine {
                 false => graph.texture(format!("resource {index}"), shape),
             })
             .collect();
-        // Only what was written before in this frame is read: what last frame left is no input of a fingerprint.
+        // Passes only read what was written earlier in this frame, as a fingerprint does not cover what last frame
+        // left.
         let mut readable: Vec<Vec<usize>> = Vec::new();
         for (index, (pass, &(fingerprint, there))) in passes.iter().zip(frame).enumerate() {
             let name = format!("pass {index}");
@@ -134,7 +135,7 @@ impl Machine {
                 frame[earlier].1 && pass.target == passes[index].target && touches
             })
         };
-        // What nobody wrote is undefined, and the same for both machines only because nobody may look at it...
+        // Content that no pass wrote is undefined; it counts as 0 in both machines.
         let look = |memory: &HashMap<(usize, u32), u64>, resource: usize| -> Vec<u64> {
             (0..LAYERS).map(|layer| memory.get(&(resource, layer)).copied().unwrap_or(0)).collect()
         };

@@ -1,4 +1,4 @@
-//! What becomes of passes and why; merging; stores; explanations. No GPU.
+//! What happens to passes, and why; merging; stores; explanations. Needs no GPU.
 
 use lumbre_graph::wgpu::{Color, TextureFormat};
 use lumbre_graph::*;
@@ -23,7 +23,7 @@ fn reason<'p>(plan: &'p Plan, pass: &str) -> (&'p str, &'p str) {
     (status.word(), status.reason())
 }
 
-/// The forward renderer's frame: any of three passes may be missing.
+/// A frame of the forward renderer, in which any of three passes may be missing.
 fn forward_frame(lightmap: bool, forward: bool, transparent: bool) -> Graph<'static> {
     let mut graph = Graph::new("frame");
     let mut color = graph.texture("color", hdr().samples(4));
@@ -133,7 +133,7 @@ fn clear_if_first_goes_by_part() {
     graph.raster_pass("c").depth(&mut shadows, clear).part(Part::layer(1));
     graph.export(&shadows);
     let plan = graph.compile().expect("valid");
-    // b must not load layer 1, which a did not write; c loads it, and so shares b's render pass.
+    // b must not load layer 1, which a did not write; c loads it and therefore shares b's render pass.
     assert_eq!(plan.groups().collect::<Vec<_>>(), [vec!["a"], vec!["b", "c"]]);
 }
 
@@ -170,7 +170,7 @@ fn a_pass_that_samples_the_attachment_is_not_merged() {
         let plan = graph.compile().expect("valid");
         plan.groups().map(|group| group.into_iter().map(str::to_owned).collect()).collect()
     };
-    // The last one clears: all before it is lost, save the depth.
+    // The last pass clears the colour, so everything before it is lost except the depth.
     assert_eq!(groups(&graph), [vec!["opaque"], vec!["cleared"]]);
     graph.raster_pass("hold").color(&mut color, LoadOp::Load).depth(&mut z, LoadOp::Load);
     graph.export(&color);
@@ -315,7 +315,7 @@ fn a_chain_on_a_retained_resource_runs_whole() {
     let first = build(1, 1).compile().expect("valid");
     let next = |graph: Graph| graph.compile_with(first.history(), CompileOptions::default()).expect("valid");
     assert_eq!(running(&next(build(1, 1))), ["use"]);
-    // The texture holds what `above` made of it: to draw `above` again, `below` must come first.
+    // The texture has the content that `above` made; to draw `above` again, `below` must run first.
     assert_eq!(running(&next(build(1, 2))), ["below", "above", "use"]);
     assert_eq!(running(&next(build(2, 1))), ["below", "above", "use"]);
 }
@@ -394,7 +394,7 @@ fn passes_belong_to_whoever_declared_them() {
     let explanation = graph.compile().expect("valid").explain();
     let owners: Vec<_> = explanation.passes.iter().map(|pass| pass.owner.as_deref()).collect();
     assert_eq!(owners, [None, Some("glow"), Some("glow"), Some("rim")]);
-    // Said where the name does not.
+    // The owner is only mentioned where it differs from the pass's name.
     let text = explanation.to_text();
     assert_eq!(text.matches("(glow's)").count(), 1, "{text}");
     assert!(!text.contains("(rim's)"), "{text}");

@@ -1,18 +1,20 @@
-//! The ambient cube: the light at a point as six surfaces would take it, one along each axis, and what any other surface makes of it
-//! (Mitchell, McTaggart and Green, "Shading in Valve's Source Engine", SIGGRAPH 2006). Not where the light comes from, nor the
-//! interpolation between cubes.
+//! The ambient cube: the light at a point as six surfaces would receive it, one along each axis direction, and the
+//! light of any other surface interpolated from them (Mitchell, McTaggart and Green, "Shading in Valve's Source
+//! Engine", SIGGRAPH 2006). The light itself and the interpolation between cubes are found elsewhere.
 
 use glam::{DVec3, DVec4};
 
-/// How open a point is at least where anything is known of its light: below, there is none.
+/// Openness below this counts as 0: nothing is known about the light there, and the result is black.
 pub const LEAST_OPENNESS: f64 = 1e-12;
 
-/// E/π for a surface with this unit normal: the three sides that it faces, weighted by the squares of its components, which add up to 1.
+/// Returns E/π for a surface with this unit normal: the three sides that it faces, weighted by the squared
+/// components of the normal, which add up to 1.
 ///
-/// Each side is E/π for a surface along its axis, times how open the probes are that it was interpolated from, and that openness in `w`
-/// (above 0, at most 1, the same for the three): a probe inside of a wall counts so little that only where there is no other does its
-/// light show. What was interpolated is divided by its own weight, so that such probes neither darken nor colour what is beside them.
-/// No openness, or a normal without a direction, gives no light.
+/// `x`, `y` and `z` are the sides along each axis that the normal faces. Their RGB is E/π for a surface along that
+/// axis, premultiplied by the openness of the probes that it was interpolated from; `w` is that openness (above 0,
+/// at most 1, the same for all three). A probe inside a wall has so little openness that its light shows only where
+/// there is no other probe. Dividing by the interpolated openness keeps such probes from darkening or tinting their
+/// neighbours. An openness of 0, or a zero normal, gives no light.
 ///
 /// ```
 /// use glam::{DVec3, DVec4};
@@ -26,8 +28,9 @@ pub const LEAST_OPENNESS: f64 = 1e-12;
 ///
 /// # Error of the f32 twin
 ///
-/// The sums of three products of squares are off by 4 u of their terms by magnitudes; the quotient by that over the openness, by as much
-/// of the result for the openness itself, and by 2.5 units in the last place (5 u).
+/// The sums of three products of squares are off by 4 u of the sum of their terms' magnitudes. The quotient is off
+/// by that error over the openness, by as much again relative to the result for the openness itself, and by 2.5
+/// units in the last place (5 u) for the division.
 pub fn ambient_cube(normal: DVec3, x: DVec4, y: DVec4, z: DVec4) -> DVec3 {
     let weights = normal * normal;
     let sum = weights.x * x + weights.y * y + weights.z * z;

@@ -1,21 +1,22 @@
-//! An angle from its sine and cosine. Not a function that equations name: f32 needs it, because WGSL's atan2 is
+//! An angle from its sine and cosine. This is a helper that no equation names: f32 needs it because WGSL's atan2 is
 //! only good to 4096 units in the last place.
 
 use std::f64::consts::FRAC_PI_2;
 
-/// Keeps 0/0 away.
+/// Avoids 0/0.
 const SMALLEST_DIVISOR: f64 = 1e-30;
 
-/// The angle in radians, 0 to π/2, of a sine and a cosine that are at least 0: `sine.atan2(cosine)`. Only their
-/// ratio counts; towards 0 where both are under 10⁻³⁰, which no sine and cosine are.
+/// Returns the angle in radians, 0 to π/2, of a sine and a cosine that are at least 0: `sine.atan2(cosine)`. Only
+/// their ratio matters, unless both are under 10⁻³⁰ (which cannot happen for a sine and cosine of one angle); then
+/// the result goes to 0.
 ///
 /// # Error of the f32 twin
 ///
-/// At most 9 u of the angle, u = 2⁻²⁴. The tangent is a division (5 u); the polynomial (Abramowitz and Stegun,
-/// Handbook of Mathematical Functions, 4.4.49) is off by 1.8·10⁻⁸ (.3 u), and its terms beyond the first, 27 %
-/// of the sum at most and each 15 u at most (two tangents, a product, its coefficient), add 3 u, less what the
-/// arctangent flattens (its logarithmic slope is .79 there); the sum 1 u. Beyond 45 degrees the rounding of π/2
-/// and of the difference take the place of what the smaller angle's share leaves.
+/// At most 9 u of the angle, u = 2⁻²⁴. The tangent is a division (5 u). The polynomial (Abramowitz and Stegun,
+/// Handbook of Mathematical Functions, 4.4.49) is off by 1.8·10⁻⁸ (.3 u). Its terms beyond the first are at most 27
+/// % of the sum, each off by at most 15 u (two tangents, a product, its coefficient), and add 3 u, less the
+/// flattening of the arctangent (its logarithmic slope is .79 there); the sum adds 1 u. Beyond 45 degrees the
+/// smaller angle has a smaller share of the result, and the rounding of π/2 and of the difference make up for that.
 pub fn quarter_angle(sine: f64, cosine: f64) -> f64 {
     let tangent = sine.min(cosine) / sine.max(cosine).max(SMALLEST_DIVISOR);
     if sine > cosine { FRAC_PI_2 - tangent.atan() } else { tangent.atan() }

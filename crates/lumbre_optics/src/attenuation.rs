@@ -1,8 +1,8 @@
-//! Distance attenuation of a positional light. Not the spot cone: that is `spot`.
+//! Distance attenuation of a positional light. The spot cone is in `spot`.
 
 use glam::{DVec3, Vec3};
 
-/// How a positional light weakens with the distance d in metres.
+/// How a positional light weakens with the distance d, in metres.
 ///
 /// The factor is `1 / (constant + linear d + quadratic d²)`, OpenGL 2.1 §2.14.1 and document \[I\],
 /// optionally clamped to 1 (document \[M\]) and optionally faded out at `range` with the window of
@@ -17,8 +17,8 @@ pub struct Attenuation {
     pub quadratic: f32,
     /// Clamp the factor to 1, as document \[M\] does and OpenGL does not.
     pub clamp: bool,
-    /// Distance in metres at which the light ends, multiplying the factor by
-    /// `clamp(1 - (d/range)⁴, 0, 1)` (KHR_lights_punctual, "range property"); infinite without a window.
+    /// Distance in metres at which the light ends: the factor is multiplied by `clamp(1 - (d/range)⁴, 0, 1)`
+    /// (KHR_lights_punctual, "range property"). Infinity means no window.
     pub range: f32,
 }
 
@@ -35,7 +35,7 @@ impl Attenuation {
         Vec3::new(self.constant, self.linear, self.quadratic)
     }
 
-    /// The range for a shader, where infinity may not be relied on: at most [`UNLIMITED_RANGE`].
+    /// The range as shaders get it, at most [`UNLIMITED_RANGE`], because WGSL does not guarantee infinities.
     pub fn shader_range(&self) -> f32 {
         self.range.min(UNLIMITED_RANGE as f32)
     }
@@ -45,20 +45,21 @@ impl Attenuation {
         attenuate(self.coefficients().as_dvec3(), self.clamp, f64::from(self.range), distance)
     }
 
-    /// The factor at a distance, or nothing where the formula itself has none: 1/0 at the light, (0, 0, 0), a
-    /// negative or non-finite coefficient, a range of 0 or less, a distance that is negative or not finite.
+    /// Returns the factor at a distance, or `None` where the formula itself has no value: 1/0 at the light,
+    /// coefficients (0, 0, 0), a negative or non-finite coefficient, a range that is not above 0, or a distance
+    /// that is negative or not finite.
     pub fn try_factor(&self, distance: f64) -> Option<f64> {
         try_attenuate(self.coefficients().as_dvec3(), self.clamp, f64::from(self.range), distance)
     }
 
-    /// The largest factor that [`attenuate`] gives, which is the one at distance 0.
+    /// The largest factor that [`attenuate`] gives, which it does at distance 0.
     pub fn strongest(&self) -> f64 {
         self.factor(0.0)
     }
 
-    /// The distance in metres beyond which the factor is below `threshold`: infinite if it never is, 0 if it
-    /// always is. A bound on what a light can reach, so it ignores how the window weakens the light before
-    /// its range.
+    /// Returns the distance in metres beyond which the factor is below `threshold`: the range if it never is
+    /// (infinity without a window), 0 if it always is. This is an upper bound on how far a light reaches, so it
+    /// ignores how the window weakens the light before its range.
     pub fn reach(&self, threshold: f64) -> f64 {
         let [constant, linear, quadratic] = self.coefficients().as_dvec3().to_array();
         let range = f64::from(self.range).max(0.0);
@@ -69,38 +70,40 @@ impl Attenuation {
         if excess < 0.0 || (self.clamp && threshold > 1.0) {
             return 0.0;
         }
-        // The positive root of c d² + b d - excess, in the form that does not cancel.
+        // The positive root of c d² + b d - excess, in the form that avoids cancellation.
         let divisor = linear + (linear * linear + 4.0 * quadratic * excess).sqrt();
         if divisor > 0.0 { (2.0 * excess / divisor).min(range) } else { range }
     }
 }
 
-/// Distance in metres under which a light with no constant term stops getting stronger: 1 cm.
+/// Distance in metres below which a light without a constant term gets no stronger: 1 cm.
 ///
-/// With a = b = 0 the law has no value at the light itself; there the denominator stays at what it is at this
-/// distance, so an inverse-square light is at most 10⁴ times its intensity. A constant term above b/100 +
-/// c/10⁴ never meets the floor.
+/// With a = b = 0 the law has no value at the light itself. Below this distance the denominator keeps the value
+/// that it has here, so that an inverse-square light is at most 10⁴ times its intensity. The floor never takes
+/// effect if the constant term is above b/100 + c/10⁴.
 pub const MINIMUM_DISTANCE: f64 = 0.01;
-/// Distances are clamped to 10¹⁸ m, a hundred light years: its square is still an f32.
+/// Distances are clamped to 10¹⁸ m, a hundred light years, whose square is still an f32.
 pub const MAXIMUM_DISTANCE: f64 = 1e18;
-/// What an infinite range counts as: far enough beyond [`MAXIMUM_DISTANCE`] for the window to be exactly 1.
+/// The finite value that stands for an infinite range: far enough beyond [`MAXIMUM_DISTANCE`] for the window to be
+/// exactly 1.
 pub const UNLIMITED_RANGE: f64 = 1e30;
-/// Smallest denominator, which only coefficients that are refused on loading can reach.
+/// Smallest denominator. Only coefficients that are rejected on loading can reach it.
 const MINIMUM_DENOMINATOR: f64 = 1e-30;
 
-/// `1 / (a + b d + c d²)` for `coefficients` (a, b, c) and a distance d in metres, clamped to 1 if
-/// `clamp_to_one`, times the window `1 - (d/range)⁴`. Finite, at least 0, and never rising with the distance.
+/// Returns `1 / (a + b d + c d²)` for `coefficients` (a, b, c) and a distance d in metres, clamped to 1 if
+/// `clamp_to_one`, times the window `1 - (d/range)⁴`. The result is finite, at least 0, and never increases with
+/// the distance.
 ///
-/// The denominator is at least what b and c alone give at [`MINIMUM_DISTANCE`]. Constant attenuation (a, 0,
-/// 0) is exactly 1/a at any distance, the light's own position included, as where OpenGL skips the distance.
+/// The denominator is at least what b and c alone give at [`MINIMUM_DISTANCE`]. Constant attenuation (a, 0, 0) is
+/// exactly 1/a at any distance, even at the light's own position, just as OpenGL skips the distance there.
 ///
 /// # Error of the f32 twin
 ///
-/// At most 13 u of the factor, and 28 u (d/range)⁴ of the factor without its window. The denominator is a sum
-/// of positive terms, with the rounded constants 6 u of it; the division 5 u, window and product 2 u. The
-/// ratio, a division by a rounded end, is off by 6 u, its fourth power by 27 u, which the difference from 1
-/// turns into an absolute error: near its range a light is off by much of the little that is left of it.
-/// Nothing else cancels.
+/// At most 13 u of the factor, plus 28 u (d/range)⁴ of the factor without its window. The denominator is a sum of
+/// positive terms, off by 6 u with its rounded constants; the division adds 5 u, window and product 2 u. The ratio
+/// d/range, a division by a rounded range, is off by 6 u and its fourth power by 27 u. The difference from 1 turns
+/// that into an absolute error: close to its range a light is off by much of the little that is left of it. Nothing
+/// else cancels.
 pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: f64) -> f64 {
     let limited = distance.clamp(0.0, MAXIMUM_DISTANCE);
     let full = coefficients.x + (coefficients.y + coefficients.z * limited) * limited;
@@ -113,21 +116,24 @@ pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: 
     window * if clamp_to_one { factor.min(1.0) } else { factor }
 }
 
-/// c times [`attenuate`] for coefficients (a, 0, c), not clamped to 1: the inverse square law, where `constant` = a/c in m² is 0. From `inverse_range_squared`
-/// in 1/m² and the square of the distance in m²: what a loop over many lights has at hand. For ranges from 10⁻⁹ to 10¹⁵ m.
+/// Returns c times [`attenuate`] for coefficients (a, 0, c), not clamped to 1; `constant` is a/c in m², 0 for the
+/// inverse-square law. It takes `inverse_range_squared` in 1/m² and the squared distance in m², which are what a
+/// loop over many lights has at hand. For ranges from 10⁻⁹ to 10¹⁵ m.
 ///
 /// # Error of the f32 twin
 ///
-/// At most 9 u of the factor, and 4 u (d/range)⁴ of the factor without its window: the division is 5 u, the difference before it and the sum in the divisor
-/// 1 u each, and under a centimetre the divisor, the square of a rounded constant, 2 u; the fourth power is off by 3 u of itself.
+/// At most 9 u of the factor, plus 4 u (d/range)⁴ of the factor without its window: the division is off by 5 u, the
+/// difference before it and the sum in the divisor by 1 u each, and below a centimetre the divisor, the square of a
+/// rounded constant, by 2 u; the fourth power is off by 3 u of itself.
 pub fn attenuate_quadratic(constant: f64, inverse_range_squared: f64, distance_squared: f64) -> f64 {
     let ratio_squared = (distance_squared * inverse_range_squared).clamp(0.0, 1.0);
     let window = 1.0 - ratio_squared * ratio_squared;
     window / (constant + distance_squared).max(MINIMUM_DISTANCE * MINIMUM_DISTANCE)
 }
 
-/// [`attenuate`], or nothing where the formula itself has no value: 1/0 at the light or for coefficients that are all 0, a negative or
-/// non-finite coefficient, a range of 0 or less, a distance that is negative or not finite.
+/// Returns [`attenuate`], or `None` where the formula itself has no value: 1/0 at the light or for coefficients
+/// that are all 0, a negative or non-finite coefficient, a range that is not above 0, or a distance that is
+/// negative or not finite.
 pub fn try_attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: f64) -> Option<f64> {
     let usable = coefficients.is_finite() && coefficients.min_element() >= 0.0 && range > 0.0;
     let defined = distance.is_finite()
@@ -167,7 +173,7 @@ mod tests {
 
     #[test]
     fn at_the_light() {
-        // OpenGL's constant term decides exactly; without one, the value at a centimetre.
+        // OpenGL's constant term sets the factor here; without one it is the value at a centimetre.
         assert_eq!(triple(1.0, 1.0, 1.0).factor(0.0), 1.0);
         assert_eq!(triple(0.5, 0.0, 0.0).factor(0.0), 2.0);
         assert!((Attenuation::INVERSE_SQUARE.factor(0.0) / 1e4 - 1.0).abs() < 1e-15);
@@ -209,7 +215,7 @@ mod tests {
                 let got =
                     attenuate_quadratic(constant / quadratic, inverse_range_squared, distance * distance)
                         / quadratic;
-                // A few roundings of 2⁻⁵³ of the factor without its window, from which 1 - (d/range)⁴ cancels.
+                // A few roundings of 2⁻⁵³ of the factor without its window, since 1 - (d/range)⁴ cancels.
                 let unwindowed = unlimited.factor(distance);
                 assert!((got - expected).abs() <= 2e-15 * unwindowed, "{general:?} {part}: {got} {expected}");
             }

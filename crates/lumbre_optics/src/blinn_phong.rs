@@ -1,5 +1,5 @@
-//! The half-vector highlight (n·h)ⁿ and its two fits to Phong's exponent. Not Blinn's full model of 1977:
-//! that is `torrance_sparrow`.
+//! The half-vector highlight (n·h)ⁿ and two ways to fit it to Phong's exponent. Blinn's full model of 1977 is in
+//! `torrance_sparrow`.
 
 use glam::DVec3;
 
@@ -7,15 +7,16 @@ use crate::half_vector::half_vector;
 use crate::lambert::lambert;
 use crate::power::cosine_lobe;
 
-/// (n·h)ⁿ where n·l > 0, else 0: the exponent as it stands, as in OpenGL 2.1 §2.14.1. All directions unit.
+/// Returns (n·h)ⁿ where n·l > 0, else 0, with the exponent used as it is, like OpenGL 2.1 §2.14.1. All directions
+/// are unit vectors.
 ///
-/// Where l = -v there is no half vector: 0, or 1 for exponent 0.
+/// Where l = -v there is no half vector and the result is 0, or 1 for exponent 0.
 ///
 /// # Error of the f32 twin
 ///
-/// That of [`cosine_lobe`] in the direction of a half vector that is off by 9 u per component. Where |n·l| is
-/// at most 3 u Σ|n l| either side of the gate is right. For exponents near 0 a half vector across the normal
-/// within rounding takes (n·h)ⁿ from 0 to 1.
+/// That of [`cosine_lobe`] with a half vector that is off by 9 u per component. Where |n·l| is at most 3 u Σ|n l|,
+/// the result may be that of either side of the test n·l > 0. For exponents near 0 and a half vector perpendicular
+/// to the normal within rounding, (n·h)ⁿ may be anything from 0 to 1.
 pub fn blinn_phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
     if normal.dot(light) <= 0.0 {
         return 0.0;
@@ -23,23 +24,23 @@ pub fn blinn_phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -
     cosine_lobe(normal, half_vector(light, viewer), shininess)
 }
 
-/// (n·h)^(4n), document \[E\]: takes Phong's exponent. Equal to Phong in the plane of incidence as n grows,
-/// and with only about cos θ_i of its energy out of it.
+/// Returns (n·h)^(4n), document \[E\]. It takes Phong's exponent and approaches Phong in the plane of incidence as
+/// n grows; out of that plane it has only about cos θ_i of Phong's energy.
 ///
 /// # Error of the f32 twin
 ///
-/// As [`blinn_phong`] with 4 n, which is exact.
+/// That of [`blinn_phong`]; multiplying n by 4 is exact.
 pub fn blinn_phong_4n(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
     blinn_phong(normal, light, viewer, 4.0 * shininess)
 }
 
-/// (n·h)^(4 n cos θ_i), the fit of document \[I\]: takes Phong's exponent and keeps Phong's energy at every
-/// incidence.
+/// Returns (n·h)^(4 n cos θ_i), the fit of document \[I\]. It takes Phong's exponent and keeps Phong's energy at
+/// every angle of incidence.
 ///
 /// # Error of the f32 twin
 ///
-/// As [`blinn_phong`] with an exponent that is off by 4 n (3 u Σ|n l| + u n·l): relatively more where light
-/// grazes.
+/// That of [`blinn_phong`] with an exponent that is off by 4 n (3 u Σ|n l| + u n·l), which is relatively more at
+/// grazing angles.
 pub fn blinn_phong_matched(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
     blinn_phong(normal, light, viewer, 4.0 * shininess * lambert(normal, light))
 }
@@ -75,8 +76,8 @@ mod tests {
         assert_eq!(blinn_phong(DVec3::ZERO, DVec3::Y, DVec3::Y, 0.0), 0.0);
     }
 
-    /// The largest difference from Phong in the plane of incidence, for a viewer within 60 degrees of the
-    /// mirror direction.
+    /// The largest difference from Phong in the plane of incidence, for a viewer within 60 degrees of the mirror
+    /// direction.
     fn worst_in_plane(exponent: f64) -> f64 {
         (-6000i32..=6000)
             .map(|step| {
@@ -90,8 +91,8 @@ mod tests {
 
     #[test]
     fn four_n_meets_phong_in_the_plane() {
-        // The largest of |cos⁴ⁿ(x/2) - cosⁿ(x)|: .030, .014, .0069, .0027, .0014, integrated numerically by
-        // others; they give two digits, so half a unit of the second.
+        // The largest of |cos⁴ⁿ(x/2) - cosⁿ(x)|: .030, .014, .0069, .0027, .0014, published results of numerical
+        // integration with two digits, so the tolerance is half a unit of the second.
         for (exponent, error) in
             [(5.0, 0.030), (10.0, 0.014), (20.0, 0.0069), (50.0, 0.0027), (100.0, 0.0014)]
         {

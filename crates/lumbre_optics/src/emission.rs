@@ -1,9 +1,9 @@
-//! Emission: light that a surface adds whatever falls on it. In real time it lights nothing else; in the
-//! baker it does.
+//! Emission: light that a surface adds regardless of the light that falls on it. In real time it lights nothing
+//! else; in the baker it does.
 
 use glam::DVec3;
 
-/// The lit colour with the surface's own radiance added; all linear RGB.
+/// Returns the lit colour plus the surface's own radiance, all linear RGB.
 ///
 /// # Error of the f32 twin
 ///
@@ -12,8 +12,8 @@ pub fn add_emission(lit: DVec3, emission: DVec3) -> DVec3 {
     lit + emission
 }
 
-/// The exitance E = π L in W/m² of a surface that emits the radiance L in W/(m² sr) evenly: what the baker
-/// starts from.
+/// Returns the exitance E = π L in W/m² of a surface that emits the radiance L in W/(m² sr) evenly in all
+/// directions. The baker starts from it.
 ///
 /// # Error of the f32 twin
 ///

@@ -1,62 +1,67 @@
-//! The highlight of glTF's metallic-roughness materials: the specular term of its bidirectional reflectance (glTF 2.0, appendix B.3), and the
-//! lobes of Phong and Blinn with the same brightness. Not the documents' highlights, which are bare powers: k_s is their brightness at the
-//! peak, and here it is the part of the light that a surface reflects when it is lit along its normal.
+//! Highlights that keep their energy: the specular term of glTF's metallic-roughness materials (glTF 2.0, appendix
+//! B.3), and the lobes of Phong and Blinn with the same brightness. In the documents' highlights, which are bare
+//! powers of a cosine, k_s is the brightness at the peak; here it is the fraction of the light that a surface
+//! reflects when it is lit along its normal.
 //!
-//! The exponent n = 2/α² - 2 stands for the roughness throughout, as that of n·h. A highlight of that width that reflects k_s of the light
+//! The exponent n = 2/α² - 2 of n·h stands for the roughness throughout. A highlight of that width that reflects
+//! the fraction k_s of the light is 1/(4 α²) = (n + 2)/8 times as bright at its peak, and is proportional to n·l.
 //! is 1/(4 α²) = (n + 2)/8 times as bright at its peak, and weakens with n·l.
 //!
-//! **Which exponents.** Blinn's lobe takes n as it stands. Phong's r·v turns twice as far as h, so that it takes n/4, and the two
-//! half-vector forms of Phong's exponent likewise. Against appendix B under a point light, over balls of six roughnesses from .15 to 1 and
-//! three metalnesses, the best factors of the exponent are 0.98 (Blinn), .273 (Phong) and .274 (matched Blinn); taking 1 and 1/4 instead
-//! costs a hundredth of the error. The test `gltf_materials` prints the table.
+//! **Which exponents.** Blinn's lobe takes n as it is. The angle of Phong's r·v is twice that of n·h, so Phong's
+//! lobe takes n/4, and so do the two half-vector forms of Phong's exponent. Compared with appendix B under a point
+//! light, on balls of six roughnesses from .15 to 1 and three metalnesses, the best factors of the exponent are
+//! 0.98 (Blinn), .273 (Phong) and .274 (matched Blinn). Using 1 and 1/4 instead costs a hundredth of the error. The
+//! test `gltf_materials` prints the table.
 //!
-//! **The constant.** (n + 2)/8 is that of microfacets, whose areas add up to the surface's. The constants that keep each lobe's own energy
-//! ([`blinn_phong_normalization`](crate::blinn_phong_normalization)) are three times as far from appendix B, whose rough surfaces lose the
-//! light that microfacets send to each other: a metal of roughness 1 reflects half as much as they say.
+//! **The constant.** (n + 2)/8 is the constant of microfacets, whose projected areas add up to that of the surface.
+//! The constants that conserve each lobe's own energy
+//! ([`blinn_phong_normalization`](crate::blinn_phong_normalization)) are three times as far from appendix B, whose
+//! rough surfaces lose the light that is scattered between microfacets: a metal of roughness 1 reflects half as
+//! much as they predict.
 
 use glam::DVec3;
 
 use crate::fresnel::fresnel_schlick;
 use crate::normalization::{TINY_LENGTH_SQUARED, safe_normalize};
 
-/// Most that a highlight is brighter than its light: as at the peak of the largest exponent. At grazing angles the specification's goes on
-/// to 700 times as much, which two strong lamps would drive out of f32.
+/// Upper limit of a highlight's factor: its value at the peak of the largest exponent. At grazing angles the
+/// specification goes up to 700 times as high, which would overflow f32 with two strong lamps.
 const LARGEST_LOBE: f64 = 1.3e5;
 
 /// Smallest number that the Smith term divides by.
 const TINY_DIVISOR: f64 = 1e-30;
-/// The α² of an exponent of 10⁶.
+/// The α² that belongs to an exponent of 10⁶.
 const SMOOTHEST: f64 = 1.998e-6;
-/// Less than the α² of any exponent.
+/// A lower limit below the α² of any exponent.
 const TINY_ALPHA_SQUARED: f64 = 1e-37;
 
-/// (n + 2)/8: the brightness of a highlight's peak where the exponent n of n·h reflects all light.
+/// Returns (n + 2)/8: the factor at the peak of a highlight with the exponent n of n·h that reflects all light.
 ///
 /// # Error of the f32 twin
 ///
-/// u: a sum.
+/// u, for the sum.
 pub fn lobe_peak(shininess: f64) -> f64 {
     0.125 * (shininess.max(0.0) + 2.0)
 }
 
-/// Trowbridge and Reitz's distribution ("GGX"), 1 at the peak: (α²/(α² + sin² (1 - α²)))².
+/// Returns Trowbridge and Reitz's distribution ("GGX") scaled to 1 at the peak: (α²/(α² + sin² (1 - α²)))².
 ///
 /// # Error of the f32 twin
 ///
-/// 2 (1 - q) 8 u and 14 u of it, with q its root.
+/// 2 (1 - q) 8 u + 14 u relative, with q its root.
 pub fn distribution_ggx(sine_squared: f64, alpha_squared: f64) -> f64 {
     let alpha = alpha_squared.clamp(TINY_ALPHA_SQUARED, 1.0);
     let ratio = alpha / (alpha + sine_squared.clamp(0.0, 1.0) * (1.0 - alpha));
     ratio * ratio
 }
 
-/// Smith's masking and shadowing of microfacets at one height (Heitz 2014) over n·v:
-/// 2 n·l/(n·l √(α² + (1 - α²)(n·v)²) + n·v √(α² + (1 - α²)(n·l)²)). In [0, 2/α]; cosines below 0 count as 0, and
-/// α² is held in [1.998·10⁻⁶, 1], from an exponent of 10⁶ to one of 0.
+/// Returns Smith's height-correlated masking and shadowing (Heitz 2014), divided by n·v: 2 n·l/(n·l √(α² + (1 -
+/// α²)(n·v)²) + n·v √(α² + (1 - α²)(n·l)²)). It is in [0, 2/α]. Negative cosines count as 0, and α² is clamped to
+/// [1.998·10⁻⁶, 1], which are exponents of 10⁶ and 0.
 ///
 /// # Error of the f32 twin
 ///
-/// 24 u: two roots of sums of positive terms (11 u), products, a sum, a division.
+/// 24 u: two roots of sums of positive terms (11 u), products, a sum and a division.
 pub fn smith_attenuation(n_light: f64, n_viewer: f64, alpha_squared: f64) -> f64 {
     let (light, viewer) = (n_light.clamp(0.0, 1.0), n_viewer.clamp(0.0, 1.0));
     let alpha = alpha_squared.clamp(SMOOTHEST, 1.0);
@@ -64,8 +69,9 @@ pub fn smith_attenuation(n_light: f64, n_viewer: f64, alpha_squared: f64) -> f64
     2.0 * light / (light * root(viewer) + viewer * root(light)).max(TINY_DIVISOR)
 }
 
-/// The specular term of a glTF material, linear RGB: Schlick's Fresnel, GGX and Smith, times the cosine n·l. Zero where light or viewer
-/// is behind. Times the light's colour, which is irradiance/π, like every specular factor.
+/// Returns the specular term of a glTF material, linear RGB: Schlick's Fresnel, GGX and Smith, times the cosine
+/// n·l. It is zero where the light or the viewer is behind the surface. Like every specular factor it is multiplied
+/// by the light's colour, which is irradiance/π.
 ///
 /// ```
 /// use glam::DVec3;
@@ -78,8 +84,9 @@ pub fn smith_attenuation(n_light: f64, n_viewer: f64, alpha_squared: f64) -> f64
 ///
 /// # Error of the f32 twin
 ///
-/// Of D by that of sin² and 6 u of α², of G by those of its cosines and of α², of F by 12 u of its cosine, and 8 u; either side of n·l > 0
-/// and n·v > 0.
+/// D is off by the effect of the error of sin² and of 6 u of α², G by that of its cosines and of α², F by that of
+/// 12 u of its cosine, and the product by 8 u more. Near n·l = 0 and n·v = 0 the result may be that of either side
+/// of the test.
 pub fn gltf_reflection(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, specular: DVec3) -> DVec3 {
     let (n_light, n_viewer) = (normal.dot(light), normal.dot(viewer));
     if n_light <= 0.0 || n_viewer <= 0.0 {
@@ -99,14 +106,14 @@ pub fn gltf_reflection(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f6
 mod tests {
     use super::*;
 
-    /// The part of the light that leaves, by the midpoint rule over directions.
+    /// The fraction of the light that is reflected, by the midpoint rule over directions.
     fn reflected(shininess: f64, light_angle: f64) -> f64 {
         let light = DVec3::new(light_angle.sin(), light_angle.cos(), 0.0);
         let steps = 400;
         let mut sum = 0.0;
         for i in 0..steps {
             for j in 0..steps {
-                // Even in sin² and azimuth: even in the cosine-weighted solid angle.
+                // Uniform in sin² and azimuth means uniform in cosine-weighted solid angle.
                 let sine = ((f64::from(i) + 0.5) / f64::from(steps)).sqrt();
                 let azimuth = (f64::from(j) + 0.5) / f64::from(steps) * std::f64::consts::TAU;
                 let viewer =
@@ -126,8 +133,8 @@ mod tests {
             }
         }
         assert!(reflected(300.0, 0.3) > 0.97);
-        // What single scattering leaves at roughness 1, lit along the normal: D = 1/π and G/(4 n·l n·v) = 1/(2 (1 + n·v)), whose integral
-        // over n·v is 1 - ln 2.
+        // The part that single scattering reflects at roughness 1, lit along the normal: D = 1/π and G/(4 n·l
+        // n·v) = 1/(2 (1 + n·v)), whose integral over n·v is 1 - ln 2.
         let rough = reflected(0.0, 0.0);
         assert!((rough - (1.0 - std::f64::consts::LN_2)).abs() < 1e-4, "{rough}");
     }

@@ -1,22 +1,23 @@
-//! How much a picture may be off: a number that every knob of accuracy takes.
+//! The accepted error of a picture, shared by all settings that trade accuracy for speed.
 
-/// The largest difference of a pixel and channel that is accepted, in exposed linear radiance between 0 and 1, the display's white: above 0, at most 1.
+/// The largest accepted difference of any pixel and channel, in exposed linear radiance between 0 and 1, the
+/// display's white. Above 0 and at most 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorBound(f32);
 
 impl ErrorBound {
-    /// A bound; none of a number that is not above 0 and at most 1.
+    /// Creates a bound, or returns `None` if the number is not above 0 and at most 1.
     pub fn new(error: f32) -> Option<Self> {
         (error > 0.0 && error <= 1.0).then_some(Self(error))
     }
 
-    /// The number.
+    /// Returns the number.
     pub fn get(self) -> f32 {
         self.0
     }
 }
 
-// There is no NaN among them, and no zero with a sign.
+// Values are never NaN or zero, so equality is reflexive and agrees with the bits.
 impl Eq for ErrorBound {}
 
 impl std::hash::Hash for ErrorBound {

@@ -1,5 +1,5 @@
-//! A light as one point of a surface meets it: its direction and its two factors. Not what the surface does
-//! with it: that is `shade`. Not its visibility either: shadows are another's factor.
+//! A light as it reaches one point of a surface: its direction and its two factors. The reflection by the surface
+//! is in `shade`. Visibility is not included; shadows are a separate factor.
 
 use glam::DVec3;
 
@@ -9,7 +9,7 @@ use crate::normalization::{safe_length, safe_normalize, try_normalize};
 use crate::spot::{SpotCosines, spot_factor};
 use crate::{Light, LightKind};
 
-/// One light at one point.
+/// One light as it reaches one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
     /// L_a, linear RGB.
@@ -38,21 +38,21 @@ impl LightSample {
     };
 }
 
-/// The light as it arrives at `point`, in metres and world space like `light_position`. `light_axis` is the
-/// unit direction in which it shines, the -Z axis of its entity; only directional lights and spotlights read
+/// Returns the light as it arrives at `point`, in metres and world space like `light_position`. `light_axis` is the
+/// unit direction in which the light shines, the -Z axis of its entity; only directional lights and spotlights use
 /// it.
 ///
-/// OpenGL's rules: a directional light is not attenuated, and a spot narrows it too; the ambient colour takes
-/// both factors. At the light's own position there is no direction, so only the ambient part is left there
-/// (with a cone, not even that).
+/// The rules are OpenGL's: a directional light is not attenuated, but a spot cone applies to it too, and the
+/// ambient colour gets both factors. At the light's own position there is no direction, so only the ambient part is
+/// left there (and with a cone narrower than π, not even that).
 ///
 /// # Error of the f32 twin
 ///
-/// Direction: 9 u of each component, a difference made unit; 7 u for a directional light. Attenuation: that
-/// of [`attenuate`](crate::attenuate), its 13 u and 28 u as 37 u and 76 u for a distance that is off by 12 u
-/// (difference, square and a root of 9 u) under a law of at most the second power. Spot: that of
-/// [`spot_factor`] for a cosine that is off by 12 u Σ|l axis|, and within that of the edge either side's
-/// value. Colours are copied.
+/// Direction: 9 u of each component, for a normalized difference; 7 u for a directional light. Attenuation: that of
+/// [`attenuate`](crate::attenuate), with 37 u and 76 u in place of its 13 u and 28 u, because the distance is off
+/// by 12 u (difference, square and a root of 9 u) under a law of at most the second power. Spot: that of
+/// [`spot_factor`] for a cosine that is off by 12 u Σ|l axis|; within that of the edge it may be the value of
+/// either side. Colours are copied.
 pub fn evaluate_light(light: &Light, light_position: DVec3, light_axis: DVec3, point: DVec3) -> LightSample {
     if !light.enabled {
         return LightSample::DARK;
@@ -64,7 +64,7 @@ pub fn evaluate_light(light: &Light, light_position: DVec3, light_axis: DVec3, p
     let (direction, attenuation) = if light.kind == LightKind::Directional {
         (safe_normalize(-light_axis), 1.0)
     } else {
-        // Halved, the difference of any two finite positions is finite.
+        // The halves are subtracted, as their difference is finite for any two finite positions.
         let half_way = light_position * 0.5 - point * 0.5;
         (safe_normalize(half_way), light.attenuation.factor(2.0 * safe_length(half_way)))
     };
@@ -82,7 +82,7 @@ pub fn evaluate_light(light: &Light, light_position: DVec3, light_axis: DVec3, p
     }
 }
 
-/// Why a light cannot be evaluated at a point. [`evaluate_light`] has a value there all the same.
+/// Why a light has no value at a point. [`evaluate_light`] returns a finite substitute there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum NoLight {
     /// The light is off.
@@ -94,18 +94,18 @@ pub enum NoLight {
     /// The point is the light's own position.
     #[error("the point is the light's own position, from which no direction leads to it")]
     AtTheLight,
-    /// The law of distance has no value: see [`try_attenuate`](crate::try_attenuate).
+    /// The attenuation has no value: see [`try_attenuate`](crate::try_attenuate).
     #[error("the attenuation has no value there: give coefficients that are at least 0 and not all 0")]
     NoAttenuation,
-    /// The cone has none: see [`SpotCone::try_factor`](crate::SpotCone::try_factor).
+    /// The spot cone has no value: see [`SpotCone::try_factor`](crate::SpotCone::try_factor).
     #[error("the cone has no value: give angles from 0 to π/2 and an exponent of at least 0")]
     NoCone,
 }
 
-/// [`evaluate_light`], or why there is nothing to evaluate.
+/// Returns [`evaluate_light`], or the reason why it is undefined.
 ///
 /// # Errors
-/// [`NoLight`], the first reason in the order of its list.
+/// [`NoLight`], the first reason that applies.
 pub fn try_evaluate_light(
     light: &Light,
     light_position: DVec3,
@@ -160,7 +160,7 @@ mod tests {
             let sample = evaluate_light(&light, DVec3::ONE, -DVec3::Y, point);
             assert_eq!((sample.direction, sample.attenuation, sample.spot), (DVec3::Y, 1.0, 1.0));
         }
-        // The spot applies to it: on its own axis that is all, or nothing with a cutoff of 0.
+        // A spot cone applies to it too: at its own axis the factor is 1, or 0 with a cutoff of 0.
         light.spot = Some(SpotCone::Exponent { cutoff: 0.0, exponent: 0.0 });
         assert_eq!(evaluate_light(&light, DVec3::ONE, -DVec3::Y, DVec3::ZERO).spot, 0.0);
     }
@@ -209,7 +209,7 @@ mod tests {
         let sun = Light { spot: turned.spot, ..Light::directional(Vec3::ONE) };
         assert_eq!(tried(&sun, -DVec3::Y, DVec3::ZERO), Err(NoLight::NoCone));
         assert_eq!(tried(&Light::ambient(Vec3::ONE), DVec3::ZERO, DVec3::Y), Ok(1.0));
-        // The plain twin is guarded: no light, or as much as there is.
+        // `evaluate_light` itself is guarded and gives no light there.
         assert_eq!(evaluate_light(&spot, DVec3::Y, DVec3::ZERO, DVec3::ZERO).spot, 0.0);
     }
 

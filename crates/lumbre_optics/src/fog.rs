@@ -12,12 +12,12 @@ pub enum FogMode {
         /// Distance in metres where only fog is left.
         end: f32,
     },
-    /// exp(-density z).
+    /// exp(-density z), z being the distance.
     Exponential {
         /// Density in 1/m.
         density: f32,
     },
-    /// exp(-(density z)²).
+    /// exp(-(density z)²), z being the distance.
     ExponentialSquared {
         /// Density in 1/m.
         density: f32,
@@ -45,7 +45,7 @@ pub struct Fog {
 }
 
 impl FogMode {
-    /// The feature that `shaders/optics/fog.wesl` compiles this mode under.
+    /// The feature under which `shaders/optics/fog.wesl` compiles this mode.
     pub fn shader_feature(&self) -> &'static str {
         match self {
             Self::Linear { .. } => "FOG_LINEAR",
@@ -55,7 +55,7 @@ impl FogMode {
         }
     }
 
-    /// The four numbers of [`fog_weight`]'s twin in WGSL: (start, end, 0, 0), (density, 0, 0, 0), or
+    /// The four parameters that [`fog_weight`]'s WGSL twin takes: (start, end, 0, 0), (density, 0, 0, 0), or
     /// (start, end, near weight, far weight).
     pub fn parameters(&self) -> [f32; 4] {
         match *self {
@@ -66,21 +66,22 @@ impl FogMode {
     }
 }
 
-/// Distances beyond 10¹⁸ m count as that: its square is still an f32.
+/// Larger distances are clamped to 10¹⁸ m, whose square is still an f32.
 const MAXIMUM_DISTANCE: f64 = 1e18;
-/// exp(-80) is 2·10⁻³⁵, the last power of ten before f32's denormals.
+/// exp(-80) is 2·10⁻³⁵, still well above f32's denormals.
 const LARGEST_EXPONENT: f64 = 80.0;
 
-/// Fogs thinner than this, in metres, are walls: f32 cannot divide by numbers near its denormals.
+/// Fogs whose end is closer than this to their start, in metres, are a step: f32 cannot divide by numbers near its
+/// denormals.
 const SMALLEST_SPAN: f64 = 1e-30;
 
-/// The part of the way from `start` to `end` that `distance` has gone, 0 to 1: a step at `end` where the two
-/// are equal.
+/// Returns how far `distance` is along the way from `start` to `end`, as a fraction from 0 to 1. If the two are
+/// equal, the result is a step at `end`.
 ///
 /// # Error of the f32 twin
 ///
-/// 7 u of it: two differences of given numbers, u each however much cancels, and a division. Spans within 2 u
-/// of 10⁻³⁰ m may count as either side of it.
+/// 7 u relative: two differences of given numbers, each off by u however much cancels, and a division. A span
+/// within 2 u of 10⁻³⁰ m may count as either side of that limit.
 pub fn fog_fraction(start: f64, end: f64, distance: f64) -> f64 {
     let span = end - start;
     if span.abs() < SMALLEST_SPAN {
@@ -93,8 +94,8 @@ pub fn fog_fraction(start: f64, end: f64, distance: f64) -> f64 {
 ///
 /// # Error of the f32 twin
 ///
-/// 7 u of 1 - weight, and u of the weight: absolute, so that the last traces before the end are relatively
-/// off by more.
+/// 7 u of 1 - weight, plus u of the weight. The error is absolute, so just before the end, where little weight is
+/// left, the relative error is larger.
 pub fn fog_linear(start: f64, end: f64, distance: f64) -> f64 {
     1.0 - fog_fraction(start, end, distance.abs().min(MAXIMUM_DISTANCE))
 }
@@ -103,8 +104,8 @@ pub fn fog_linear(start: f64, end: f64, distance: f64) -> f64 {
 ///
 /// # Error of the f32 twin
 ///
-/// e^r - 1 of the weight, r = 2 u x + 2 u (3 + 2 x) for x = density z: a product and a clamp to a constant,
-/// then exp, 3 + 2 x units in the last place. At most 6 u absolute.
+/// e^r - 1 of the weight, with r = 2 u x + 2 u (3 + 2 x) for x = density z: a product and a clamp to a constant,
+/// then exp, good to 3 + 2 x units in the last place. At most 6 u absolute.
 pub fn fog_exponential(density: f64, distance: f64) -> f64 {
     let depth = density * distance.abs().min(MAXIMUM_DISTANCE);
     (-depth.clamp(0.0, LARGEST_EXPONENT)).exp()
@@ -114,10 +115,10 @@ pub fn fog_exponential(density: f64, distance: f64) -> f64 {
 ///
 /// # Error of the f32 twin
 ///
-/// e^r - 1 of the weight, r = 4 u x + 2 u (3 + 2 x) for x = (density z)²: three roundings and the rounded
-/// root of 80.
+/// e^r - 1 of the weight, with r = 4 u x + 2 u (3 + 2 x) for x = (density z)²: three roundings and the rounded root
+/// of 80.
 pub fn fog_exponential_squared(density: f64, distance: f64) -> f64 {
-    // Clamped before the square, which overflows f32 sooner than the product.
+    // Clamped before squaring: the square overflows f32 sooner than the product does.
     let depth = (density * distance.abs().min(MAXIMUM_DISTANCE)).clamp(0.0, LARGEST_EXPONENT.sqrt());
     (-depth * depth).exp()
 }
@@ -126,17 +127,17 @@ pub fn fog_exponential_squared(density: f64, distance: f64) -> f64 {
 ///
 /// # Error of the f32 twin
 ///
-/// 7 u of the fraction f times |S_A - S_B|, and u (3 S_A (1 - f) + 2 S_B f + S_A f) for the two differences,
+/// 7 u of the fraction f times |S_A - S_B|, plus u (3 S_A (1 - f) + 2 S_B f + S_A f) for the two differences, the
 /// products and the sum.
 pub fn fog_depth_cue(start: f64, end: f64, near_weight: f64, far_weight: f64, distance: f64) -> f64 {
     let far = fog_fraction(start, end, distance.abs().min(MAXIMUM_DISTANCE));
     near_weight * (1.0 - far) + far_weight * far
 }
 
-/// The weight of the lit colour at a distance in metres from the viewer, in [0, 1].
+/// Returns the weight of the lit colour at a distance in metres from the viewer, in [0, 1].
 ///
-/// In WGSL the mode is one of the features `FOG_LINEAR`, `FOG_EXPONENTIAL`, `FOG_EXPONENTIAL_SQUARED`,
-/// `FOG_DEPTH_CUE`.
+/// In WGSL one of the features `FOG_LINEAR`, `FOG_EXPONENTIAL`, `FOG_EXPONENTIAL_SQUARED` and `FOG_DEPTH_CUE`
+/// selects the mode.
 ///
 /// # Error of the f32 twin
 ///
@@ -151,8 +152,9 @@ pub fn fog_weight(mode: &FogMode, distance: f64) -> f64 {
     }
 }
 
-/// [`fog_weight`], or nothing where the formula has none: a linear fog or depth cue that ends where it starts (a step, there), a number
-/// that is not finite, a density or distance that is negative, a weight outside [0, 1].
+/// Returns [`fog_weight`], or `None` where the formula has no value: a linear fog or depth cue that ends where it
+/// starts ([`fog_weight`] makes it a step), a number that is not finite, a negative density or distance, or a
+/// weight outside [0, 1].
 pub fn try_fog_weight(mode: &FogMode, distance: f64) -> Option<f64> {
     let span = |start: f32, end: f32| {
         let span = f64::from(end) - f64::from(start);
@@ -171,11 +173,11 @@ pub fn try_fog_weight(mode: &FogMode, distance: f64) -> Option<f64> {
     defined.then(|| fog_weight(mode, distance))
 }
 
-/// `weight * lit + (1 - weight) * fog_color`, linear RGB. Alpha is untouched.
+/// Returns `weight * lit + (1 - weight) * fog_color`, linear RGB. Alpha is not affected by fog.
 ///
 /// # Error of the f32 twin
 ///
-/// 2 u of the lit part and 3 u of the fog's: its weight is a difference.
+/// 2 u of the lit part and 3 u of the fog's, whose weight is a difference.
 pub fn apply_fog(weight: f64, lit: DVec3, fog_color: DVec3) -> DVec3 {
     weight * lit + (1.0 - weight) * fog_color
 }
@@ -235,7 +237,7 @@ mod tests {
         );
         for mode in [FogMode::Exponential { density: 1e30 }, FogMode::ExponentialSquared { density: 1e30 }] {
             let far = fog_weight(&mode, 1e300);
-            // exp(-80), the smallest weight there is.
+            // exp(-80), the smallest weight that is returned.
             assert!((0.0..2e-35).contains(&far), "{mode:?}: {far}");
             assert_eq!(fog_weight(&mode, 0.0), 1.0);
         }

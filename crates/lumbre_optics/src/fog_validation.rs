@@ -1,12 +1,12 @@
-//! What a fog may not be. Checked when the scene is loaded; the equations themselves stay finite whatever
-//! they are given.
+//! Which fogs are rejected, and why. This is checked when the scene is loaded; the equations themselves stay finite
+//! for any finite input.
 
 use thiserror::Error;
 
 use crate::validation::{color_fault, fault};
 use crate::{Fog, FogMode};
 
-/// Why a fog is refused.
+/// Why a fog is rejected.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("fog of \"{scene}\": {field} is {value}, which is {reason}; give {allowed}")]
 pub struct FogError {
@@ -16,18 +16,17 @@ pub struct FogError {
     pub field: &'static str,
     /// Its value.
     pub value: f32,
-    /// What is wrong with it.
+    /// What is wrong with the value.
     pub reason: &'static str,
-    /// What would be right.
+    /// Which values are accepted.
     pub allowed: &'static str,
 }
 
 impl Fog {
-    /// Checks that the fog can be evaluated at any distance, and names the field, the value and the remedy if
-    /// it cannot.
+    /// Checks that the fog can be evaluated at any distance. The error names the field, the value and the remedy.
     ///
     /// # Errors
-    /// [`FogError`], the first fault in the order of the fields.
+    /// [`FogError`] with the first fault found.
     pub fn validate(&self, scene: &str) -> Result<(), FogError> {
         let not_negative = "a finite number that is at least 0";
         let refuse = |field, value, reason, allowed| {

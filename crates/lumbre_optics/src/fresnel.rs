@@ -1,34 +1,34 @@
-//! Fresnel's reflectance for unpolarized light: exact for dielectrics and conductors, and Schlick's
-//! approximation. Not which way the light goes on: that is `snell`.
+//! Fresnel reflectance for unpolarized light: exact for dielectrics and conductors, and Schlick's approximation.
+//! The direction of the transmitted light is in `snell`.
 
 use glam::DVec3;
 
-/// Keeps 0/0 away where cosines are divided: its square is still an f32.
+/// Avoids 0/0 where cosines are divided; its square is still an f32.
 const TINY_COSINE: f64 = 1e-15;
-/// Keeps 0/0 away where squares of cosines are divided.
+/// Avoids 0/0 where squared cosines are divided.
 const TINY: f64 = 1e-30;
-/// Optical constants are clamped to this, beyond any that is measured, so that their fourth power is an f32.
+/// Optical constants are clamped to this. It is above any measured constant, and its fourth power is still an f32.
 pub(crate) const LARGEST_CONSTANT: f64 = 1e4;
-/// Smallest relative index of refraction: keeps f32 from dividing by a square that underflows.
+/// Smallest relative index of refraction. It keeps f32 from dividing by a square that underflows.
 const SMALLEST_INDEX: f64 = 1e-4;
 
-/// The part of the light that a smooth dielectric reflects, in [0, 1].
+/// Returns the fraction of the light that a smooth dielectric reflects, in [0, 1].
 ///
-/// `cos_incident` is n·l on the side the light comes from, clamped to [0, 1]; `eta` = η_t/η_i is the index
-/// behind over the index in front. 1 under total internal reflection (sin θ_i > eta) and at 90 degrees; 0 for
-/// `eta` = 1. At normal incidence ((eta - 1)/(eta + 1))².
+/// `cos_incident` is n·l on the side that the light comes from, clamped to [0, 1]; `eta` = η_t/η_i is the index
+/// behind the surface over the index in front. The result is 1 under total internal reflection (sin θ_i > eta) and
+/// at 90 degrees, 0 for `eta` = 1, and ((eta - 1)/(eta + 1))² at normal incidence.
 ///
 /// # Error of the f32 twin
 ///
-/// Each amplitude (x - g)/(x + g), x = cos θ_i or eta² cos θ_i, is off by 2 (g δx + x δg)/(x + g)² and 7 u of
-/// itself; F by the amplitudes times their errors, half their squares, and 2 u. g² is off by
-/// u (3 |eta² - 1| + cos² + g²), g by the root of that and 9 u, eta² cos by 3 u. About 10 u away from the
-/// critical angle; at it g may be anything up to 3·10⁻⁴, so F is off by up to .01: a cosine rounded to f32
-/// says no more.
+/// Each amplitude (x - g)/(x + g), with x = cos θ_i or eta² cos θ_i, is off by 2 (g δx + x δg)/(x + g)² and 7 u of
+/// itself; F is off by the amplitudes times their errors, half of the squared errors, and 2 u. g² is off by u (3
+/// |eta² - 1| + cos² + g²), g by the root of that and 9 u, eta² cos by 3 u. That is about 10 u away from the
+/// critical angle. At the critical angle g may have any value up to 3·10⁻⁴, so F is off by up to .01: a cosine
+/// rounded to f32 determines it no better.
 pub fn fresnel_dielectric(cos_incident: f64, eta: f64) -> f64 {
     let cosine = cos_incident.clamp(0.0, 1.0);
     let index = eta.clamp(SMALLEST_INDEX, LARGEST_CONSTANT);
-    // g = eta cos θ_t, g² = eta² - sin² θ_i: from the cosine, so that for eta = 1 it is the cosine itself.
+    // g = eta cos θ_t and g² = eta² - sin² θ_i, computed from the cosine so that for eta = 1 it equals the cosine.
     let g_squared = (index - 1.0) * (index + 1.0) + cosine * cosine;
     if g_squared < 0.0 {
         return 1.0;
@@ -39,31 +39,32 @@ pub fn fresnel_dielectric(cos_incident: f64, eta: f64) -> f64 {
     0.5 * (across * across + along * along)
 }
 
-/// [`fresnel_dielectric`], or nothing for a cosine outside [0, 1] or an index outside [10⁻⁴, 10⁴], to which it clamps them.
+/// Returns [`fresnel_dielectric`], or `None` for a cosine outside [0, 1] or an index outside [10⁻⁴, 10⁴], which
+/// that function clamps.
 pub fn try_fresnel_dielectric(cos_incident: f64, eta: f64) -> Option<f64> {
     let usable = (0.0..=1.0).contains(&cos_incident) && (SMALLEST_INDEX..=LARGEST_CONSTANT).contains(&eta);
     usable.then(|| fresnel_dielectric(cos_incident, eta))
 }
 
-/// The part of the light that a conductor in vacuum or air reflects, per channel, in [0, 1].
+/// Returns the fraction of the light that a conductor in vacuum or air reflects, per channel, in [0, 1].
 ///
 /// `eta` and `absorption` are the real and imaginary parts of its index of refraction. With no absorption and
 /// eta ≥ 1 it equals [`fresnel_dielectric`].
 ///
 /// # Error of the f32 twin
 ///
-/// The real part η² - k² - sin² is off by 3 u of each term, its modulus by that and 11 u, the larger of a and
-/// b by half of that and 9 u, the smaller by 7 u more; each quotient of sums of squares by those of its
-/// terms, twice, and 5 u. About 20 u for metals. With neither absorption nor a step in the index (η = 1, k =
-/// 0) at exactly 90 degrees all parts vanish, and the reflectance is anything in [0, 1].
+/// The real part η² - k² - sin² is off by 3 u of each term, its modulus by that and 11 u, the larger of a and b by
+/// half of that and 9 u, the smaller by 7 u more. Each quotient of sums of squares is off by the errors of its
+/// terms, twice, and 5 u. That is about 20 u for metals. With neither absorption nor a step in the index (η = 1, k
+/// = 0) at exactly 90 degrees all terms vanish, and the reflectance may be anything in [0, 1].
 pub fn fresnel_conductor(cos_incident: f64, eta: DVec3, absorption: DVec3) -> DVec3 {
     let channel = |eta: f64, absorption: f64| {
         let cosine = cos_incident.clamp(0.0, 1.0);
         let eta = eta.clamp(0.0, LARGEST_CONSTANT);
         let absorption = absorption.clamp(0.0, LARGEST_CONSTANT);
         let sine_squared = (1.0 - cosine) * (1.0 + cosine);
-        // a + ib = sqrt((eta + ik)² - sin²); the smaller of the two comes from a b = eta k, without
-        // cancelling.
+        // a + ib = sqrt((eta + ik)² - sin²). The smaller of a and b comes from a b = eta k, which avoids
+        // cancellation.
         let real = (eta - absorption) * (eta + absorption) - sine_squared;
         let modulus = (real * real + 4.0 * eta * eta * absorption * absorption).sqrt();
         let larger = (0.5 * (modulus + real.abs())).sqrt();
@@ -78,8 +79,9 @@ pub fn fresnel_conductor(cos_incident: f64, eta: DVec3, absorption: DVec3) -> DV
     DVec3::new(channel(eta.x, absorption.x), channel(eta.y, absorption.y), channel(eta.z, absorption.z))
 }
 
-/// [`fresnel_conductor`], or nothing for a cosine outside [0, 1]; for constants outside [0, 10⁴], to which it clamps them; for an index
-/// of 0 (neither part is positive); and for no boundary at all (η = 1, k = 0) at exactly 90 degrees.
+/// Returns [`fresnel_conductor`], or `None` for a cosine outside [0, 1]; for constants outside [0, 10⁴], which that
+/// function clamps; for an index of 0 (neither part is positive); and where there is no boundary at all (η = 1, k =
+/// 0) at exactly 90 degrees.
 pub fn try_fresnel_conductor(cos_incident: f64, eta: DVec3, absorption: DVec3) -> Option<DVec3> {
     let usable = |channel: usize| {
         let (eta, absorption) = (eta[channel], absorption[channel]);
@@ -95,12 +97,13 @@ pub fn try_fresnel_conductor(cos_incident: f64, eta: DVec3, absorption: DVec3) -
 
 /// Schlick's approximation: f0 + (1 - f0)(1 - cos θ)⁵, with f0 the reflectance at normal incidence.
 ///
-/// Off by at most .036 at eta = 1.5 and .198 for chromium. Leaving the denser side it needs cos θ_t in place
-/// of cos θ_i, else it is off by up to .96.
+/// Off by at most .036 at eta = 1.5 and .198 for chromium. For light leaving the denser side, pass cos θ_t in place
+/// of cos θ_i; otherwise it is off by up to .96.
 ///
 /// # Error of the f32 twin
 ///
-/// 10 u (1 - f0)(1 - cos)⁵ and u of the sum: the difference's u five times, three products, and two more.
+/// 10 u (1 - f0)(1 - cos)⁵ and u of the sum: the difference's u enters five times, then three products and two
+/// more.
 pub fn fresnel_schlick(cos_incident: f64, f0: DVec3) -> DVec3 {
     let away = 1.0 - cos_incident.clamp(0.0, 1.0);
     let squared = away * away;
@@ -138,14 +141,14 @@ mod tests {
         let eta: f64 = 2.0 / 3.0;
         let critical = eta.asin();
         assert_eq!(fresnel_dielectric((critical + 1e-9).cos(), eta), 1.0);
-        // Just inside, g² = 2 eta cos θ δ, and each amplitude is (1 - x)/(1 + x), its square 1 - 4 x + 8 x² -
-        // 12 x³ + ….
+        // Just inside, g² = 2 eta cos θ δ. Each amplitude is (1 - x)/(1 + x), and its square 1 - 4 x + 8 x² - 12 x³
+        // + ….
         let inside = fresnel_dielectric((critical - 1e-9).cos(), eta);
         let (cosine, g) = (critical.cos(), (2.0 * eta * critical.cos() * 1e-9).sqrt());
         let (across, along) = (g / cosine, g / (eta * eta * cosine));
         let expected = 1.0 - 2.0 * (across + along) + 4.0 * (across * across + along * along);
-        // x is 10⁻⁴, so the next term is 10⁻¹¹; δ is itself known to 10⁻¹⁶/10⁻⁹, which g multiplies to as
-        // much.
+        // x is 10⁻⁴, so the next term is 10⁻¹¹. δ itself is known to 10⁻¹⁶/10⁻⁹, an error that g turns into about
+        // as much.
         assert!((inside - expected).abs() < 1e-10, "{inside} {expected}");
     }
 
@@ -210,7 +213,7 @@ mod tests {
             .map(|step| f64::from(step) / 1000.0)
             .map(|c| (fresnel_schlick(c, DVec3::splat(0.04)).x - fresnel_dielectric(c, 1.5)).abs())
             .fold(0.0, f64::max);
-        // .036 as published to two digits.
+        // .036 is published to two digits.
         assert!((worst - 0.036).abs() < 0.0005, "{worst}");
     }
 

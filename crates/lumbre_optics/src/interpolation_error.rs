@@ -1,59 +1,67 @@
-//! What flat and Gouraud shading lose against Phong shading: a bound for one light over all triangles of an object that are no larger and no more curved than one of them.
-//! Not which objects and lights there are, nor what is done about it.
+//! Bounds on the error of flat and Gouraud shading relative to Phong shading, for one light over all triangles of
+//! an object that are no larger and no more curved than a given spread. Which objects and lights there are, and
+//! what follows from the bounds, is decided by the caller.
 //!
-//! Phong shading evaluates f(p, n) at a point p = Σ λ_i p_i with the normal n = m/|m|, m = Σ λ_i n_i; Gouraud shading shows Σ λ_i f_i, and flat shading f at one point with
-//! one normal. With the directions to the light l and to the viewer v, along the way from a point to a vertex:
+//! Phong shading evaluates f(p, n) at a point p = Σ λ_i p_i with the normal n = m/|m|, m = Σ λ_i n_i; Gouraud
+//! shading shows Σ λ_i f_i, and flat shading f at one point with one normal. The bounds, with l and v the
+//! directions to the light and to the viewer:
 //!
-//! - **First order.** Σ λ_i |p_i - p| ≤ h/√3 and Σ λ_i |n_i - m| ≤ δ/√3, for a longest edge h and a largest difference δ of normals, since
-//!   Σ λ_i |p_i - p|² = ½ Σ λ_i λ_j |p_i - p_j|² ≤ h²/3. So what changes at a rate L over its arguments is off by no more than L/√3 of their change across the triangle.
-//! - **Second order.** f(p_i) = f(p) + f'(p_i - p) + ½ f''(p_i - p)², and the first derivatives cancel in the sum: a smooth f is off by no more than a sixth of its second
-//!   derivative across the triangle (as Waldron 1998 has it for linear interpolation).
-//! - **Directions.** n turns by ν = δ/√(1 - δ²/3) across a triangle, l by h over the distance to the light, v likewise, each with a second derivative of at most √5 times the
-//!   square of that: of m/|m|, which is linear above, it is at most √(1 + 4) ν².
-//! - **Corners.** max(0, n·l) has one at the terminator, where the mean of values and the value of the mean differ by a quarter of their range at most.
-//! - **Steps.** A bare highlight ends where n·l = 0. It is off by what it has left there, which depends on the angle β between l and v: cosⁿ(π - β) under Phong's model,
-//!   sinⁿ(β/2) under Blinn's.
+//! - **First order.** Σ λ_i |p_i - p| ≤ h/√3 and Σ λ_i |n_i - m| ≤ δ/√3, for a longest edge h and a largest
+//!   difference δ of normals, since Σ λ_i |p_i - p|² = ½ Σ λ_i λ_j |p_i - p_j|² ≤ h²/3. So a function whose rate of
+//!   change is at most L is off by at most L/√3 times the change of its arguments across the triangle.
+//! - **Second order.** f(p_i) = f(p) + f'(p_i - p) + ½ f''(p_i - p)², and the first derivatives cancel in the sum:
+//!   a smooth f is off by at most a sixth of its second derivative across the triangle (Waldron 1998 shows this for
+//!   linear interpolation).
+//! - **Directions.** n turns by ν = δ/√(1 - δ²/3) across a triangle, and l and v by h over the distance to the
+//!   light or viewer. Each has a second derivative of at most √5 times the square of that: for m/|m|, whose
+//!   numerator is linear, it is at most √(1 + 4) ν².
+//! - **Corners.** max(0, n·l) has a corner at the terminator, where the mean of the values and the value of the
+//!   mean differ by at most a quarter of the range of values.
+//! - **Steps.** A bare highlight ends abruptly where n·l = 0. The error there is the value that the highlight still
+//!   has, which depends on the angle β between l and v: cosⁿ(π - β) under Phong's model, sinⁿ(β/2) under Blinn's.
 //!
-//! Where the bounds of first and second order are worse than all the light that there is, that is the bound.
+//! Where the bounds of first and second order exceed the largest value of the light itself, that value is the
+//! bound.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::{Attenuation, FlatRule, Lobe, MINIMUM_DISTANCE, ReflectionModel, lobe_peak, model_exponent};
 
-/// How large the triangles of an object are, and how curved, in the world.
+/// How large the triangles of an object are and how curved, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleSpread {
     /// h: the longest edge in metres.
     pub edge: f64,
-    /// δ: the longest difference between two unit normals of a triangle's vertices, 0 to 2.
+    /// δ: the largest length of the difference between two unit normals at a triangle's vertices, 0 to 2.
     pub normals: f64,
-    /// The longest difference between the unit normal of a triangle and that of one of its vertices, 0 to 2.
+    /// The largest length of the difference between a triangle's unit normal and that at one of its vertices, 0 to
+    /// 2.
     pub face_normals: f64,
 }
 
-/// What makes a highlight's shape.
+/// The parameters that determine the shape of a highlight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Highlight {
     /// The specular model.
     pub model: ReflectionModel,
-    /// What its brightness means.
+    /// How the brightness is defined.
     pub lobe: Lobe,
     /// Exponent, at least 0.
     pub shininess: f64,
 }
 
-/// A cone as an object meets it.
+/// How the spot cone of a light varies over an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ConeOverObject {
-    /// It changes nothing on the object.
+    /// The object is entirely inside, where the factor is constant.
     Everywhere,
-    /// Its factor changes by so much for a change of 1 in the cosine of its angle.
+    /// The factor changes by at most this for a change of 1 in the cosine of its angle.
     Slope(f64),
-    /// It ends on the object all at once.
+    /// The cone ends on the object with a hard edge.
     Step,
 }
 
-/// A light and what it can do on an object.
+/// A light, and bounds on what it does over an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightOverObject {
     /// k_a L_a, k_d L_d and k_s L_s: the largest channel of each, before attenuation.
@@ -64,30 +72,32 @@ pub struct LightOverObject {
     pub specular: f64,
     /// The shape of the highlight.
     pub highlight: Highlight,
-    /// How the light weakens with distance; not read where that is infinite.
+    /// How the light weakens with distance; not used if `distances` are infinite.
     pub attenuation: Attenuation,
-    /// From the light to the nearest and the farthest point of the object, in metres; infinite for directional lights.
+    /// Distances in metres from the light to the nearest and the farthest point of the object; infinite for
+    /// directional lights.
     pub distances: [f64; 2],
     /// Its cone.
     pub cone: ConeOverObject,
-    /// From the viewer to the nearest point of the object, in metres; infinite for a viewer that is infinitely far.
+    /// Distance in metres from the viewer to the nearest point of the object; infinite for a viewer at infinity.
     pub viewer_distance: f64,
     /// The largest angle between the directions to the light and to the viewer, in radians.
     pub light_to_viewer: f64,
-    /// Whether n·l may be 0 somewhere on the object.
+    /// Whether n·l can be 0 anywhere on the object.
     pub terminator: bool,
 }
 
-/// How far each rate of evaluation may be from Phong shading: the largest difference of radiance.
+/// Bounds on how much flat and Gouraud shading differ from Phong shading, as differences of radiance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InterpolationError {
-    /// Of flat shading.
+    /// Error of flat shading.
     pub flat: f64,
-    /// Of Gouraud shading.
+    /// Error of Gouraud shading.
     pub gouraud: f64,
-    /// The most that the light changes between two vertices of a triangle, as Gouraud shading has it: what an upper limit on vertices' colours adds to is a quarter of this.
+    /// The largest change of the light between two vertices of a triangle under Gouraud shading. Where vertex
+    /// colours are clamped to an upper limit, the clamp adds at most a quarter of this to the error.
     pub change: f64,
-    /// The most that the light adds anywhere on the object.
+    /// The largest radiance that the light adds anywhere on the object.
     pub brightest: f64,
 }
 
@@ -104,7 +114,8 @@ impl std::ops::Add for InterpolationError {
     }
 }
 
-/// Bounds for one light on triangles of this spread. Infinite where nothing is known: of highlights of the Torrance-Sparrow model.
+/// Returns bounds for one light on triangles of this spread. They are infinite where no bound is known, which is
+/// for highlights of the Torrance-Sparrow model.
 pub fn interpolation_error(
     light: &LightOverObject,
     triangle: &TriangleSpread,
@@ -118,18 +129,20 @@ pub fn interpolation_error(
         (light.specular, specular(light, &falloff, triangle, &turns)),
     ];
     let sum = |sum, (color, part): (f64, Part)| {
-        // A light may be infinitely close, and have nothing for this part all the same.
+        // Skipped, because a light of colour 0 may have infinite bounds (very near lights) and 0 times infinity is
+        // NaN.
         if color == 0.0 { sum } else { sum + part.times(color).in_cone(light.cone, &turns) }
     };
     parts.into_iter().fold(InterpolationError::default(), sum)
 }
 
-/// Of one part of a light of colour 1.
+/// Bounds for one part (ambient, diffuse or specular) of a light of colour 1.
 #[derive(Clone, Copy, Debug)]
 struct Part {
-    /// The most that it is anywhere.
+    /// The largest value anywhere.
     most: f64,
-    /// Bounds on the error of Gouraud and of flat shading, and on the change across a triangle; `most` is a bound too.
+    /// Bounds on the error of Gouraud and of flat shading, and on the change across a triangle. `most` bounds them
+    /// too.
     gouraud: f64,
     flat: f64,
     change: f64,
@@ -137,7 +150,7 @@ struct Part {
 
 impl Part {
     fn times(self, color: f64) -> InterpolationError {
-        // What is 0 everywhere is so however fast it might change.
+        // If it is 0 everywhere its error is 0, even with an infinite rate of change.
         let within = |error: f64| color * if self.most == 0.0 { 0.0 } else { error.min(self.most) };
         InterpolationError {
             flat: within(self.flat),
@@ -149,7 +162,8 @@ impl Part {
 }
 
 impl InterpolationError {
-    /// The same light within a cone, whose factor s is at most 1: s f is off by at most the error of f, and f times the change of s.
+    /// Bounds for the same light inside a cone, whose factor s is at most 1: the error of s f is at most the error
+    /// of f plus f times the change of s.
     fn in_cone(self, cone: ConeOverObject, turns: &Turns) -> Self {
         let change = match cone {
             ConeOverObject::Everywhere => return self,
@@ -157,7 +171,7 @@ impl InterpolationError {
             ConeOverObject::Step => [f64::INFINITY; 2],
         };
         let within = |error: f64, change: f64| (error + self.brightest * change.min(1.0)).min(self.brightest);
-        // Nothing is nothing, in an infinite change too.
+        // Without light there is no error, even with an infinite change.
         if self.brightest == 0.0 {
             return self;
         }
@@ -172,18 +186,19 @@ impl InterpolationError {
 
 /// 1/√3.
 const FIRST_ORDER: f64 = 0.577_350_269_189_625_8;
-/// Of the second derivatives.
+/// The factor of the second derivatives.
 const SECOND_ORDER: f64 = 1.0 / 6.0;
-/// √5: the second derivative of a direction over the square of its first.
+/// √5: the largest second derivative of a direction over the square of its first derivative.
 const OF_DIRECTIONS: f64 = 2.236_067_977_499_79;
 
-/// How an attenuation changes over an object: its largest value, and the largest of its first and second derivatives, per metre.
+/// How an attenuation changes over an object: its largest value, and its largest first and second derivatives, per
+/// metre and per square metre.
 #[derive(Clone, Copy, Debug)]
 struct Falloff {
     most: f64,
     slope: f64,
     curvature: f64,
-    /// The slope at its corners: where its range ends, or where it is clamped.
+    /// The slope at its corners: where its range ends, and where it is clamped.
     corner: f64,
 }
 
@@ -199,20 +214,21 @@ impl Falloff {
             let unknown = f64::INFINITY;
             return Self { most, slope: unknown, curvature: unknown, corner: unknown };
         }
-        // a = w/q with q = a + b d + c d², w = 1 - (d/r)⁴. -(1/q)' = q'/q², and q' d ≤ 2 q.
+        // The attenuation is w/q with q = a + b d + c d² and w = 1 - (d/r)⁴; -(1/q)' = q'/q², and q' d ≤ 2 q.
         let divisor = |d: f64| (constant + (linear + quadratic * d) * d).max(f64::MIN_POSITIVE);
         let inverse = 1.0 / divisor(near);
         // d/q is largest at √(a/c).
         let peak = if quadratic > 0.0 { near.max((constant / quadratic).sqrt()) } else { near };
         let relative = (linear * inverse + 2.0 * quadratic * peak / divisor(peak)).min(2.0 / near);
-        // Across and along the direction to the light.
+        // The second derivative along the direction to the light, and across it.
         let bend = (2.0 * relative * relative).max(2.0 * quadratic * inverse).max(relative / near);
         let mut falloff = Self { most, slope: inverse * relative, curvature: inverse * bend, corner: 0.0 };
         if clamp && inverse > 1.0 {
             falloff.corner = falloff.slope;
         }
         if range.is_finite() {
-            // (1/q) w', 2 (1/q)' w' and (1/q) w'', each with 1/q ≤ 1/(c d²) or its largest value.
+            // The terms (1/q) w', 2 (1/q)' w' and (1/q) w'', each with 1/q bounded by 1/(c d²) or its largest
+            // value.
             let t = (far / range).min(1.0);
             let by_square = if quadratic > 0.0 { 1.0 / (quadratic * range * range) } else { f64::INFINITY };
             falloff.slope += (inverse * t * t).min(by_square) * 4.0 * t / range;
@@ -228,15 +244,15 @@ impl Falloff {
 /// How far directions turn across a triangle, in radians.
 #[derive(Clone, Copy, Debug)]
 struct Turns {
-    /// Of the interpolated normal, of the direction to the light and of that to the viewer.
+    /// Turns of the interpolated normal, of the direction to the light and of that to the viewer.
     normal: f64,
     light: f64,
     viewer: f64,
-    /// Of the same, between any point and the one that flat shading takes.
+    /// The same, between any point and the one that flat shading evaluates.
     normal_to_flat: f64,
     light_to_flat: f64,
     viewer_to_flat: f64,
-    /// Metres from any point to that one.
+    /// Largest distance in metres from any point to that one.
     flat_reach: f64,
 }
 
@@ -245,7 +261,7 @@ impl Turns {
         let TriangleSpread { edge, normals, face_normals } = *triangle;
         let shortest = 1.0 - normals * normals / 3.0;
         let angle = |chord: f64| 2.0 * (0.5 * chord).min(1.0).asin();
-        // The centroid is two thirds of a median from a vertex, and no median is longer than the longest edge.
+        // The centroid is two thirds of a median away from a vertex, and no median is longer than the longest edge.
         let (flat_reach, normal_to_flat) = match rule {
             FlatRule::Centroid => (edge * 2.0 / 3.0, angle(face_normals)),
             FlatRule::FirstVertex | FlatRule::LastVertex => (edge, angle(normals)),
@@ -263,7 +279,7 @@ impl Turns {
     }
 }
 
-/// What is attenuated and no more.
+/// The ambient part, which is only attenuated.
 fn ambient(falloff: &Falloff, triangle: &TriangleSpread, turns: &Turns) -> Part {
     let h = triangle.edge;
     let change = falloff.slope * h;
@@ -276,7 +292,7 @@ fn ambient(falloff: &Falloff, triangle: &TriangleSpread, turns: &Turns) -> Part 
     }
 }
 
-/// a max(0, n·l).
+/// The diffuse part: the attenuation a times max(0, n·l).
 fn diffuse(light: &LightOverObject, falloff: &Falloff, triangle: &TriangleSpread, turns: &Turns) -> Part {
     let (h, Falloff { most, slope, curvature, corner }) = (triangle.edge, *falloff);
     let turn = turns.normal + turns.light;
@@ -291,7 +307,8 @@ fn diffuse(light: &LightOverObject, falloff: &Falloff, triangle: &TriangleSpread
     }
 }
 
-/// The highlight S = max(0, cos α)ⁿ times a, or, where it keeps its energy, times a n·l (n + 2)/8.
+/// The specular part: the highlight S = max(0, cos α)ⁿ times a, or, with an energy-keeping lobe, times a n·l (n +
+/// 2)/8.
 fn specular(light: &LightOverObject, falloff: &Falloff, triangle: &TriangleSpread, turns: &Turns) -> Part {
     let Highlight { model, lobe, shininess } = light.highlight;
     let keeps_energy = lobe == Lobe::EnergyKeeping;
@@ -301,7 +318,7 @@ fn specular(light: &LightOverObject, falloff: &Falloff, triangle: &TriangleSprea
         ReflectionModel::Phong => Some(PowerLobe::of_reflection(exponent)),
         ReflectionModel::Blinn => Some(PowerLobe::of_half_vector(exponent, light.light_to_viewer)),
         ReflectionModel::Blinn4n => Some(PowerLobe::of_half_vector(4.0 * exponent, light.light_to_viewer)),
-        // Its exponent goes to 0 at the terminator, and with it the shape.
+        // Its exponent goes to 0 at the terminator, where the lobe loses its shape, so `most` is the only bound.
         ReflectionModel::BlinnMatched => None,
         ReflectionModel::TorranceSparrow => {
             let unknown = f64::INFINITY;
@@ -323,7 +340,7 @@ fn specular(light: &LightOverObject, falloff: &Falloff, triangle: &TriangleSprea
         let product =
             lobe.curvature * turn * turn + 2.0 * lobe.slope * turn * cosine + OF_DIRECTIONS * cosine * cosine;
         let bend = curvature * h * h + 2.0 * slope * h * (lobe.slope * turn + cosine) + a * product;
-        // On both sides of the terminator it is at most so much: there its corner is.
+        // The corner at the terminator, bounded by the value that is left on its two sides.
         let corners = corner * h + 2.0 * a * step(cosine) * cosine.min(1.0);
         Part {
             most: a,
@@ -345,30 +362,32 @@ fn specular(light: &LightOverObject, falloff: &Falloff, triangle: &TriangleSprea
     Part { most, gouraud: peak * part.gouraud, flat: peak * part.flat, change: peak * part.change }
 }
 
-/// max(0, cos α)ⁿ, and how fast α changes.
+/// A lobe max(0, cos α)ⁿ, and how fast α changes.
 #[derive(Clone, Copy, Debug)]
 struct PowerLobe {
     exponent: f64,
-    /// The largest first derivative over α, and the largest second one over the square of α's rate.
+    /// The largest first derivative with respect to α, and the largest second derivative over the square of α's
+    /// rate.
     slope: f64,
     curvature: f64,
-    /// Of α over the turn of the normal, and over those of light and viewer.
+    /// How much α turns per turn of the normal, and per turn of the directions to light and viewer.
     by_normal: f64,
     by_directions: f64,
     half_vector: bool,
 }
 
 impl PowerLobe {
-    /// α is between the viewer and the mirrored light: the normal counts twice.
+    /// For α between the viewer and the mirrored light direction: a turn of the normal counts twice.
     fn of_reflection(exponent: f64) -> Self {
-        // A mirrored direction has a second derivative of at most 3 times the square of its first.
+        // A mirrored direction has a second derivative of at most 3 times the square of its first derivative.
         Self::new(exponent, 3.0, (2.0, 1.0), false)
     }
 
-    /// α is between the normal and the half vector, which turns by the half of what both directions do, over the cosine of half the angle between them.
+    /// For α between the normal and the half vector, which turns by half of what both directions do, over the
+    /// cosine of half the angle between them.
     fn of_half_vector(exponent: f64, light_to_viewer: f64) -> Self {
         let half = (0.5 * light_to_viewer).clamp(0.0, FRAC_PI_2).cos();
-        // (l + v)/|l + v| has at most 2 √5 + 3 times that square.
+        // (l + v)/|l + v| has a second derivative of at most 2 √5 + 3 times that square.
         Self::new(exponent, 2.0 * OF_DIRECTIONS + 3.0, (1.0, 0.5 / half.max(f64::MIN_POSITIVE)), true)
     }
 
@@ -378,8 +397,8 @@ impl PowerLobe {
         (by_normal, by_directions): (f64, f64),
         half_vector: bool,
     ) -> Self {
-        // n cosⁿ⁻¹α sin α is at most √(n/e), up to 17 % more for small n; cosⁿ'' is at most n, and what the path of the two directions bends adds the first derivative
-        // times its second.
+        // n cosⁿ⁻¹α sin α is at most √(n/e), or up to 17 % more for small n. cosⁿ'' is at most n; the curvature of
+        // the paths of the two directions adds the first derivative times their second.
         let slope = match exponent {
             ..1.0 => f64::INFINITY,
             ..2.0 => 1.0,
@@ -394,7 +413,7 @@ impl PowerLobe {
         self.by_normal * normal + self.by_directions * (light + viewer)
     }
 
-    /// The most that is left of it where n and l are within so much of a right angle.
+    /// The largest value that the lobe can have within the angle `cosine` of the terminator.
     fn at_terminator(&self, light_to_viewer: f64, cosine: f64) -> f64 {
         let least = match self.half_vector {
             true => FRAC_PI_2 - 0.5 * light_to_viewer - cosine,
@@ -413,7 +432,7 @@ mod tests {
         Light, LightKind, LightSample, SpotCone, Surface, SurfaceSample, evaluate_light, light_contribution,
     };
 
-    /// Numbers that are the same in every run.
+    /// A pseudo-random generator that gives the same numbers in every run.
     struct Random(u64);
 
     impl Random {
@@ -437,7 +456,7 @@ mod tests {
         }
     }
 
-    /// A triangle with normals, seen and lit from somewhere.
+    /// A triangle with vertex normals, and a light and a viewer for it.
     struct Lit {
         corners: [DVec3; 3],
         normals: [DVec3; 3],
@@ -464,7 +483,7 @@ mod tests {
                 _ => Light::point(Vec3::ONE),
             };
             light.ambient = Vec3::splat(random.one_of(&[0.0, 0.5]));
-            // Toward the front as a rule, often at the terminator.
+            // Usually in front of the triangle, often near the terminator.
             let place = match random.one_of(&[0, 1, 2]) {
                 0 => random.direction(),
                 1 => (face + random.direction()).normalize(),
@@ -530,7 +549,7 @@ mod tests {
             }
         }
 
-        /// The largest and smallest weights of a grid over the triangle.
+        /// Barycentric weights of a grid of points over the triangle.
         fn grid() -> impl Iterator<Item = [f64; 3]> {
             (0..=24).flat_map(|a| (0..=24 - a).map(move |b| [a, b, 24 - a - b].map(|n| f64::from(n) / 24.0)))
         }
@@ -540,7 +559,7 @@ mod tests {
             (mean(&self.corners), mean(&self.normals).normalize())
         }
 
-        /// What there is to know of light and triangle, by looking at every point.
+        /// Measures the bounds of light and triangle at every point of the grid.
         fn over(&self) -> LightOverObject {
             let directional = self.light.kind == LightKind::Directional;
             let mut over = LightOverObject {
@@ -587,7 +606,7 @@ mod tests {
             over
         }
 
-        /// The largest true errors of flat and Gouraud shading.
+        /// The largest actual errors of flat and Gouraud shading.
         fn errors(&self) -> [f64; 2] {
             let corners = [0, 1, 2].map(|corner| self.shade(self.corners[corner], self.normals[corner]));
             let flat = self.shade((self.corners[0] + self.corners[1] + self.corners[2]) / 3.0, self.face());
@@ -609,7 +628,8 @@ mod tests {
         for number in 0..compared {
             let lit = Lit::random(&mut random);
             let spread = lit.spread();
-            // The distance to the object is that to its box, which the grid knows to a 24th of an edge.
+            // The distances and angles are sampled on a grid, which misses their extremes by up to a 24th of an
+            // edge.
             let mut over = lit.over();
             let margin = spread.edge / 24.0;
             over.distances[0] = (over.distances[0] - margin).max(0.0);
@@ -633,7 +653,8 @@ mod tests {
         println!(
             "of {compared} triangles: within five times the error {near:?}, below a tenth of the light {helpful:?} (flat, Gouraud)"
         );
-        // Measured: 16 and 6 of a hundred near, 20 and 27 helpful. Bounds that are all the light that there is would hold as well, and be neither.
+        // Measured: 16 and 6 of a hundred are near, 20 and 27 helpful. A bound of all the light would hold as well,
+        // but be neither.
         assert!(near.iter().all(|near| *near > compared / 20), "bounds are far from the errors: {near:?}");
         assert!(helpful.iter().all(|helpful| *helpful > compared / 8), "bounds say nothing: {helpful:?}");
     }
@@ -667,7 +688,7 @@ mod tests {
         let plane = TriangleSpread { edge: 10.0, normals: 0.0, face_normals: 0.0 };
         let error = interpolation_error(&over, &plane, FlatRule::Centroid);
         assert_eq!((error.flat, error.gouraud, error.brightest), (0.0, 0.0, 1.0));
-        // A highlight moves with the viewer.
+        // A highlight moves across the plane, as the direction to the viewer changes.
         let shiny = LightOverObject { specular: 0.5, ..over };
         let error = interpolation_error(&shiny, &plane, FlatRule::Centroid);
         assert!(error.gouraud > 0.1 && error.flat >= error.gouraud, "{error:?}");

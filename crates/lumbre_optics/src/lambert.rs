@@ -1,13 +1,13 @@
-//! Lambert's cosine law. Not the diffuse colour: `shade` multiplies it in.
+//! Lambert's cosine law. `shade` multiplies it by the diffuse colour.
 
 use glam::DVec3;
 
-/// max(n·l, 0) of unit vectors, at most 1. Zero for a zero normal or a light behind.
+/// Returns max(n·l, 0) of unit vectors, at most 1. It is 0 for a zero normal or a light behind the surface.
 ///
 /// # Error of the f32 twin
 ///
-/// 3 u Σ|n l|, absolute: each product is rounded, and summed twice, in any order. For unit vectors at most 3
-/// u √3, in fact seldom above 2 u. Relatively anything where light grazes.
+/// 3 u Σ|n l|, absolute: each product is rounded once and passes through two sums, in any order. For unit vectors
+/// that is at most 3 u √3, and in practice seldom above 2 u. The relative error is unbounded at grazing angles.
 pub fn lambert(normal: DVec3, light: DVec3) -> f64 {
     normal.dot(light).clamp(0.0, 1.0)
 }

@@ -1,8 +1,8 @@
 //! Light and material types and the reflection equations in f64.
 //!
-//! Everything that documents \[I\], \[E\] and \[M\] say about one light at one point, and nothing about
-//! scenes, files or devices. Each equation is a file with a twin in `shaders/optics`: the same name, the same
-//! order of arguments, the same guards.
+//! This crate holds everything that the documents \[I\], \[E\] and \[M\] (`docs/documents.md`) say about one light
+//! at one point. It knows nothing about scenes, files or devices. Each equation has its own file and a twin in
+//! `shaders/optics`: a WGSL function of the same name, with the same order of arguments and the same guards.
 //!
 //! ```text
 //!       Light                                   viewer_direction ─┐            Material, front or back
@@ -19,16 +19,17 @@
 //!              normalized_phong (highlights of one energy), map_normal and occlusion (textures that bend and weaken light)
 //! ```
 //!
-//! Directions are unit and point away from the surface: `normal`, `light`, `viewer`. The zero vector stands
-//! for "has none" and takes no light. For finite input every function is finite; where a formula has no value
-//! its `try_` twin says so with `None`. What may not be loaded at all, [`Light::validate`],
-//! [`Material::validate`] and [`Fog::validate`] refuse by name.
+//! Directions are unit vectors that point away from the surface: `normal`, `light`, `viewer`. The zero vector
+//! stands for "no direction" and receives no light. Every function returns finite values for finite input; where a
+//! formula itself has no value, its `try_` counterpart returns `None`. [`Light::validate`], [`Material::validate`]
+//! and [`Fog::validate`] reject input that must not be loaded at all, with an error that names the field.
 //!
-//! How far the shaders' f32 may be off, each function says under "Error of the f32 twin", in terms of u = 2⁻²⁴, the relative error of
-//! one rounding (half a unit in the last place), from what WGSL guarantees: sums, differences and products u, division 5 u,
-//! inverseSqrt 4 u, roots 9 u, exp 2 u (3 + 2 |x|), log2 8 u absolute in [1/2, 2] and 6 u of itself elsewhere. To first order, and
-//! besides a few times 2⁻¹²⁶, below which numbers may be taken for 0. The test target `twins` holds the same bounds as functions and a
-//! device to them, over a million inputs each.
+//! The section "Error of the f32 twin" of each function bounds the error of its WGSL twin. The bounds are in terms
+//! of u = 2⁻²⁴, the relative error of one rounding (half a unit in the last place), and follow from what WGSL
+//! guarantees: sums, differences and products u, division 5 u, inverseSqrt 4 u, roots 9 u, exp 2 u (3 + 2 |x|),
+//! log2 8 u absolute in [1/2, 2] and 6 u relative elsewhere. They hold to first order, plus a few times 2⁻¹²⁶,
+//! because a device may flush numbers below that to 0. The test target `twins` has the same bounds as functions and
+//! checks a device against them, with a million inputs for each.
 //!
 //! ```
 //! use glam::{DVec3, Vec3};

@@ -1,12 +1,12 @@
-//! The light component: what it emits and how it spreads. Where it stands is its entity's transform.
-//! Not the equations: those are one file each beside this one.
+//! The light component: what a light emits and how it spreads. Its position and direction are its entity's
+//! transform. The equations are in the neighbouring files.
 
 use bevy_ecs::component::Component;
 use glam::Vec3;
 
 use crate::{Attenuation, SpotCone};
 
-/// From where a light comes.
+/// What kind of source the light comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightKind {
     /// From everywhere: adds `k_a ambient`, without position or direction.
@@ -17,31 +17,31 @@ pub enum LightKind {
     Point,
 }
 
-/// Who evaluates a light: the baker, the frame, or both.
+/// What evaluates a light: the baker, the frame, or both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum BakeMode {
-    /// Shaded every frame, unknown to the baker. The default for lights made in code.
+    /// Shaded every frame and ignored by the baker. The default for lights made in code.
     #[default]
     Dynamic,
     /// Direct light is shaded every frame; its bounces are baked.
     Mixed,
-    /// Baked whole: a lightmapped mesh skips its diffuse part and keeps the specular; any other mesh is lit
-    /// in full. The default for lights imported from glTF.
+    /// Baked entirely: a lightmapped mesh skips the light's diffuse part and keeps the specular; any other mesh is
+    /// lit in full. The default for lights imported from glTF.
     Static,
 }
 
-/// A light source. Its three colours are the rows of document \[I\]'s 3x3 matrix
-/// ([`LightMatrix`](crate::LightMatrix)): a material with ambient,
-/// diffuse and specular coefficients k receives
-/// `k_a ambient + attenuation spot (k_d diffuse (l·n) + k_s specular (r·v)^n)`.
+/// A light source.
 ///
-/// Units: what multiplies k_d is irradiance / π, so a KHR_lights_punctual intensity (candela, lux) is divided
-/// by π.
+/// Its three colours are the rows of document \[I\]'s 3x3 matrix ([`LightMatrix`](crate::LightMatrix)): a material
+/// with ambient, diffuse and specular coefficients k receives `k_a ambient + attenuation spot (k_d diffuse (l·n) +
+/// k_s specular (r·v)^n)`.
+///
+/// Units: the factor on k_d is irradiance / π, so a KHR_lights_punctual intensity (candela, lux) is divided by π.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct Light {
-    /// From where it comes.
+    /// What kind of source it comes from.
     pub kind: LightKind,
-    /// L_a: linear RGB added through k_a, attenuated like the rest but not gated by l·n.
+    /// L_a: linear RGB added through k_a. It is attenuated like the rest but does not depend on l·n.
     pub ambient: Vec3,
     /// L_d: linear RGB, (W/m²)/π at distance factor 1.
     pub diffuse: Vec3,
@@ -51,17 +51,18 @@ pub struct Light {
     pub attenuation: Attenuation,
     /// The cone, if it is a spotlight. Applies to directional lights too, as in OpenGL.
     pub spot: Option<SpotCone>,
-    /// A light that is off costs nothing.
+    /// Whether the light is on. A light that is off costs nothing.
     pub enabled: bool,
     /// Whether the light asks for a shadow map.
     pub shadow: bool,
-    /// Who evaluates it.
+    /// What evaluates it.
     pub bake: BakeMode,
-    /// Radius in metres of the sphere that a point light or spotlight is, at least 0: how soft its baked shadows are. The equations
-    /// of the frame, and its light where nothing hides it, are those of its centre; other kinds of light do not read it.
+    /// Radius in metres of the sphere that a point light or spotlight is, at least 0. It determines how soft the
+    /// light's shadows are; the unoccluded light is that of a point at the centre. Other kinds of light do not use
+    /// it.
     pub radius: f32,
-    /// Angular diameter in radians of the disc that a directional light is, in [0, π/2] (the sun: 0.0093): how soft its baked
-    /// shadows are. The equations of the frame do not read it, nor do other kinds of light.
+    /// Angular diameter in radians of the disc that a directional light is, in [0, π/2] (the sun: 0.0093). It
+    /// determines how soft the light's shadows are. Other kinds of light do not use it.
     pub angle: f32,
 }
 
@@ -93,7 +94,7 @@ impl Light {
         Self { spot: Some(cone), ..Self::point(color) }
     }
 
-    /// The same, fading to nothing at this distance in metres, as KHR_lights_punctual's `range` does.
+    /// The same light, fading to nothing at this distance in metres, as KHR_lights_punctual's `range` does.
     #[must_use]
     pub fn with_range(self, range: f32) -> Self {
         Self { attenuation: Attenuation { range, ..self.attenuation }, ..self }

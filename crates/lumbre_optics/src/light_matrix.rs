@@ -1,5 +1,6 @@
-//! Document \[I\]'s matrices of one light source: what it emits, and what of it a surface reflects, each by kind of light (ambient,
-//! diffuse, specular) and colour channel. Not the equations of those reflections: `shade` uses them without any matrix.
+//! Document \[I\]'s matrices of one light source: the light that it emits, and the part that a surface reflects,
+//! each by kind (ambient, diffuse, specular) and colour channel. The reflection equations themselves do not need
+//! them: `shade` works without any matrix.
 
 use glam::{DMat3, DVec3};
 
@@ -16,8 +17,8 @@ use crate::{Light, LightSample, ReflectionModel};
 ///     └ L_rs   L_gs   L_bs ┘  specular
 /// ```
 ///
-/// Not attenuated yet, as in the document: [`scaled`](Self::scaled) by a light's distance and spot factors it is what arrives. Channels
-/// never mix.
+/// The matrix is not attenuated, as in the document: [`scaled`](Self::scaled) by a light's distance and spot
+/// factors, it is the light that arrives. Channels never mix.
 ///
 /// ```
 /// use glam::{DVec3, Vec3};
@@ -56,19 +57,19 @@ impl LightMatrix {
         [self.ambient, self.diffuse, self.specular].map(|row| row.to_array())
     }
 
-    /// The columns red, green and blue, each as (L_a, L_d, L_s).
+    /// The columns red, green and blue, each one (L_a, L_d, L_s).
     pub fn columns(&self) -> [DVec3; 3] {
         let (a, d, s) = (self.ambient, self.diffuse, self.specular);
         [DVec3::new(a.x, d.x, s.x), DVec3::new(a.y, d.y, s.y), DVec3::new(a.z, d.z, s.z)]
     }
 
-    /// For products with glam's matrices, which are made of columns.
+    /// The same as one of glam's column-major matrices.
     pub fn to_matrix(&self) -> DMat3 {
         let [red, green, blue] = self.columns();
         DMat3::from_cols(red, green, blue)
     }
 
-    /// Every entry times a factor: a distance, a spot, a dimmer.
+    /// Returns every entry times a factor, such as distance attenuation, a spot factor or a dimmer.
     pub fn scaled(self, factor: f64) -> Self {
         Self {
             ambient: self.ambient * factor,
@@ -77,19 +78,19 @@ impl LightMatrix {
         }
     }
 
-    /// Every row times a colour, channel by channel: a gel before the lamp.
+    /// Returns every row times a colour, channel by channel, like a gel in front of the lamp.
     pub fn filtered(self, color: DVec3) -> Self {
         Self { ambient: self.ambient * color, diffuse: self.diffuse * color, specular: self.specular * color }
     }
 
-    /// I = R_a L_a + R_d L_d + R_s L_s, channel by channel: the diagonal of the product R L.
+    /// Returns I = R_a L_a + R_d L_d + R_s L_s, channel by channel, which is the diagonal of the product R L.
     pub fn intensity(&self, reflection: &ReflectionMatrix) -> DVec3 {
         reflection.ambient * self.ambient
             + reflection.diffuse * self.diffuse
             + reflection.specular * self.specular
     }
 
-    /// Gives a light these colours, rounded to f32; the rest of it stays.
+    /// Sets the colours of a light, rounded to f32, and leaves the rest of it unchanged.
     pub fn put_into(&self, light: &mut Light) {
         light.ambient = self.ambient.as_vec3();
         light.diffuse = self.diffuse.as_vec3();
@@ -98,7 +99,7 @@ impl LightMatrix {
 }
 
 impl From<&Light> for LightMatrix {
-    /// The colours of a light, before any attenuation, whether it is on or off.
+    /// Takes the colours of a light before any attenuation, whether it is on or off.
     fn from(light: &Light) -> Self {
         Self {
             ambient: light.ambient.as_dvec3(),
@@ -109,7 +110,7 @@ impl From<&Light> for LightMatrix {
 }
 
 impl From<&LightSample> for LightMatrix {
-    /// What arrives at a point: with the distance and spot factors.
+    /// Takes the light that arrives at a point, with its distance and spot factors.
     fn from(light: &LightSample) -> Self {
         let colors = Self { ambient: light.ambient, diffuse: light.diffuse, specular: light.specular };
         colors.scaled(light.attenuation * light.spot)
@@ -119,7 +120,7 @@ impl From<&LightSample> for LightMatrix {
 impl std::ops::Add for LightMatrix {
     type Output = Self;
 
-    /// Two lights in one place.
+    /// The light of two lamps in one place.
     fn add(self, other: Self) -> Self {
         Self {
             ambient: self.ambient + other.ambient,
@@ -129,8 +130,8 @@ impl std::ops::Add for LightMatrix {
     }
 }
 
-/// R_i of document \[I\]: what part of each kind of light a point of a surface sends to the viewer. There a row is a channel and a
-/// column a kind; here as in [`LightMatrix`] each field is a kind.
+/// R_i of document \[I\]: the fraction of each kind of light that a point of a surface reflects to the viewer. In
+/// the document a row is a channel and a column is a kind; here each field is a kind, as in [`LightMatrix`].
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ReflectionMatrix {
     /// R_a = k_a.
@@ -142,9 +143,9 @@ pub struct ReflectionMatrix {
 }
 
 impl ReflectionMatrix {
-    /// The reflection terms of a point for light from the unit direction `light` (zero for ambient light alone) and a viewer in the
-    /// unit direction `viewer`. Its product with an attenuated [`LightMatrix`] is
-    /// [`light_contribution`](crate::light_contribution)'s total.
+    /// Returns the reflection terms of a point for light from the unit direction `light` (zero for ambient light
+    /// alone) and a viewer in the unit direction `viewer`. The [`intensity`](LightMatrix::intensity) of an
+    /// attenuated [`LightMatrix`] with it is the total of [`light_contribution`](crate::light_contribution).
     pub fn new(
         model: ReflectionModel,
         surface: impl Into<SurfaceSample>,
@@ -210,7 +211,7 @@ mod tests {
         let reflection = ReflectionMatrix { ambient, diffuse, specular: DVec3::splat(0.125) };
         let product = reflection.to_matrix() * light.to_matrix();
         let diagonal = DVec3::new(product.x_axis.x, product.y_axis.y, product.z_axis.z);
-        // Dyadic, so exact: red is .5 · .125 + 1 · 1 + .125 · 8.
+        // The numbers are exact binary fractions: red is .5 · .125 + 1 · 1 + .125 · 8.
         assert_eq!(light.intensity(&reflection), diagonal);
         assert_eq!(diagonal.x, 2.0625);
     }
@@ -233,7 +234,7 @@ mod tests {
             let arriving = LightMatrix::from(&light).scaled(sample.attenuation * sample.spot);
             assert_eq!(arriving, LightMatrix::from(&sample));
             let expected = light_contribution(model, &surface, &sample, DVec3::Y, viewer).total();
-            // The same products, in another order.
+            // The same products in another order.
             let got = arriving.intensity(&reflection);
             assert!((got - expected).abs().max_element() < 1e-14, "{model:?}: {got} {expected}");
         }

@@ -1,19 +1,19 @@
-//! What a light may not be. Checked when lights are loaded; the equations themselves stay finite whatever
-//! they are given.
+//! Which lights are rejected, and why. This is checked when lights are loaded; the equations themselves stay finite
+//! for any finite input.
 
 use thiserror::Error;
 
 use crate::validation::{color_fault, fault};
 use crate::{Attenuation, Light, LightKind, SpotCone};
 
-/// Largest product of a colour channel and the strongest distance factor: a hundred million lights of it
-/// still add up in f32.
+/// Largest product of a colour channel and the light's largest distance factor: a hundred million lights of this
+/// intensity still add up in f32.
 pub const LARGEST_INTENSITY: f64 = 1e30_f32 as f64;
 
-/// How far beyond π/2 a half angle may be: the rounding of 90 degrees in f32.
+/// How far a half angle may exceed π/2: the rounding of 90 degrees in f32.
 const ANGLE_ROUNDING: f32 = 1e-6;
 
-/// Why a light is refused.
+/// Why a light is rejected.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LightError {
     /// A number that has to be finite and at least 0 is not.
@@ -27,7 +27,7 @@ pub enum LightError {
         field: &'static str,
         /// Its value.
         value: f32,
-        /// What is wrong with it.
+        /// What is wrong with the value.
         reason: &'static str,
     },
     /// Attenuation (0, 0, 0) divides by zero at every distance.
@@ -58,10 +58,10 @@ pub enum LightError {
         field: &'static str,
         /// Its value in radians.
         value: f32,
-        /// What would be right.
+        /// Which values are accepted.
         allowed: &'static str,
     },
-    /// Colour times distance factor overflows f32 when lights add up.
+    /// Colour times distance factor is so large that the sum over the lights may overflow f32.
     #[error(
         "light \"{light}\": {field} is up to {value:e} at the strongest distance factor, above 1e30, which overflows; \
          lower the colour or raise the attenuation's constant term"
@@ -77,13 +77,13 @@ pub enum LightError {
 }
 
 impl Light {
-    /// Checks that the light can be evaluated anywhere, and names it, the field, the value and the remedy if
-    /// it cannot.
+    /// Checks that the light can be evaluated anywhere. The error names the light, the field, the value and the
+    /// remedy.
     ///
-    /// Lights that are off are checked too: they may be switched on.
+    /// Lights that are off are checked too, as they may be switched on.
     ///
     /// # Errors
-    /// [`LightError`], the first fault in the order of the fields.
+    /// [`LightError`] with the first fault found.
     pub fn validate(&self, name: &str) -> Result<(), LightError> {
         let strongest = match self.kind {
             LightKind::Point => {
@@ -134,7 +134,7 @@ fn validate_attenuation(attenuation: &Attenuation, name: &str) -> Result<(), Lig
     if attenuation.coefficients() == glam::Vec3::ZERO {
         return Err(LightError::NoAttenuation { light: name.to_owned() });
     }
-    // Infinity is a range: without a window.
+    // Infinity is a valid range: no window.
     if attenuation.range > 0.0 {
         Ok(())
     } else {
@@ -225,7 +225,7 @@ mod tests {
             let light = Light { attenuation, ..Light::point(Vec3::ONE) };
             assert!(message(&light).contains("attenuation.range"));
         }
-        // Nothing reads it there.
+        // Attenuation is not checked for lights that do not use it.
         let sun = Light {
             attenuation: Attenuation { constant: 0.0, ..Attenuation::NONE },
             ..Light::directional(Vec3::ONE)
@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn intensity_that_overflows() {
-        // 10³⁰ inverse square is 10³⁴ at the floor.
+        // An inverse-square light of 10³⁰ reaches 10³⁴ at the minimum distance.
         assert!(matches!(
             Light::point(Vec3::splat(1e30)).validate("lamp"),
             Err(LightError::TooStrong { .. })

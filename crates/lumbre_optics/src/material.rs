@@ -1,5 +1,4 @@
-//! The Phong material component. Textures that modulate it belong to the scene crate; the equations to their
-//! own files.
+//! The Phong material component. The textures that modulate it are in the scene crate.
 
 use bevy_ecs::component::Component;
 use glam::Vec3;
@@ -7,8 +6,8 @@ use glam::Vec3;
 use crate::microfacet_reflection::{Distribution, Fresnel};
 use crate::roughness::{MAX_SHININESS, shininess_from_roughness};
 
-/// The Phong coefficients of one side of a surface. All linear RGB in [0, 1] except emission, which is at
-/// least 0.
+/// The Phong coefficients of one side of a surface, all linear RGB. They are normally in [0, 1], except emission,
+/// which is only at least 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
     /// k_a.
@@ -17,8 +16,8 @@ pub struct Surface {
     pub diffuse: Vec3,
     /// k_s.
     pub specular: Vec3,
-    /// Radiance that the surface adds, W/(m² sr). Lights nothing in real time; lights everything in the
-    /// baker.
+    /// Radiance that the surface adds, in W/(m² sr). In real time it lights nothing else; in the baker it lights
+    /// the scene.
     pub emission: Vec3,
     /// Exponent n, at least 0.
     pub shininess: f32,
@@ -37,19 +36,19 @@ impl Default for Surface {
 }
 
 impl Surface {
-    /// The exponent clamped to what is used, 0 to [`MAX_SHININESS`]; 0 for no number.
+    /// Returns the exponent clamped to the range in use, 0 to [`MAX_SHININESS`]; 0 for NaN.
     pub fn shininess_in_range(&self) -> f32 {
         if self.shininess.is_nan() { 0.0 } else { self.shininess.clamp(0.0, MAX_SHININESS) }
     }
 
-    /// Whether the highlight needs the shader feature `SHARP_HIGHLIGHTS`: above [`SHARP_SHININESS`] with
-    /// specular light at all.
+    /// Returns true if the highlight needs the shader feature `SHARP_HIGHLIGHTS`: the exponent is above
+    /// [`SHARP_SHININESS`] and k_s is not 0.
     pub fn has_sharp_highlight(&self) -> bool {
         self.shininess > SHARP_SHININESS && self.specular != Vec3::ZERO
     }
 }
 
-/// How coverage is decided.
+/// How alpha determines coverage.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum AlphaMode {
     /// Alpha is ignored.
@@ -57,27 +56,27 @@ pub enum AlphaMode {
     Opaque,
     /// A fragment exists where alpha is at least the cutoff.
     Mask {
-        /// Cutoff in [0, 1].
+        /// Cutoff, finite and at least 0, normally in [0, 1].
         cutoff: f32,
     },
-    /// Drawn back to front over what is behind.
+    /// Blended over what is behind, and drawn back to front.
     Blend,
 }
 
-/// What a highlight's brightness means.
+/// How the brightness of a highlight is defined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Lobe {
-    /// The documents' and OpenGL's: a bare power, k_s at the peak whatever the exponent.
+    /// As in the documents and OpenGL: a bare power of a cosine, k_s at the peak for every exponent.
     #[default]
     Bare,
-    /// glTF's: k_s is the part of the light that is reflected along the normal, so that sharp highlights are bright and wide ones faint.
-    /// The exponent is that of n·h in every model, and the Torrance-Sparrow model is glTF's own reflectance
-    /// ([`gltf_reflection`](crate::gltf_reflection)).
+    /// As in glTF: k_s is the fraction of the light that is reflected along the normal, so that sharp highlights
+    /// are bright and wide ones faint. The exponent is that of n·h in every model, and the Torrance-Sparrow model
+    /// becomes glTF's own reflectance ([`gltf_reflection`](crate::gltf_reflection)).
     EnergyKeeping,
 }
 
 impl Lobe {
-    /// Both.
+    /// Both variants.
     pub const ALL: &'static [Self] = &[Self::Bare, Self::EnergyKeeping];
 
     /// The name used in files.
@@ -88,7 +87,7 @@ impl Lobe {
         }
     }
 
-    /// The choice with that name, if there is one.
+    /// Returns the variant with that name, or `None`.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|lobe| lobe.name() == name)
     }
@@ -99,27 +98,28 @@ impl Lobe {
 pub struct Material {
     /// The front side, where triangles wind counter-clockwise.
     pub front: Surface,
-    /// The back side, if it differs. Seen only when `double_sided`.
+    /// The back side, if it differs. It is only seen if `double_sided`.
     pub back: Option<Surface>,
     /// Opacity in [0, 1], multiplied by texture and vertex alpha.
     pub alpha: f32,
-    /// How alpha is used.
+    /// How alpha determines coverage.
     pub alpha_mode: AlphaMode,
-    /// Back faces are drawn, lit with the reversed normal.
+    /// Back faces are drawn, and lit with the reversed normal.
     pub double_sided: bool,
-    /// Shows `front.diffuse` (times texture and vertex colour) whatever the light, and no emission (KHR_materials_unlit).
+    /// Shows `front.diffuse` (times texture and vertex colour) regardless of the lights, without emission
+    /// (KHR_materials_unlit).
     pub unlit: bool,
-    /// k_r of the ray tree, linear RGB.
+    /// Mirror reflection coefficient k_r of the ray tree, linear RGB.
     pub mirror: Vec3,
-    /// k_t of the ray tree, linear RGB.
+    /// Transmission coefficient k_t of the ray tree, linear RGB.
     pub transmission: Vec3,
     /// Index of refraction, at least 1 (1.5 by default).
     pub ior: f32,
-    /// What its highlight's brightness means.
+    /// How the brightness of its highlight is defined.
     pub lobe: Lobe,
-    /// Spread of the microfacets (bare lobes of Torrance-Sparrow only).
+    /// Distribution of the microfacets (only used by bare lobes of Torrance-Sparrow).
     pub distribution: Distribution,
-    /// What the microfacets reflect (bare lobes of Torrance-Sparrow only).
+    /// Fresnel reflectance of the microfacets (only used by bare lobes of Torrance-Sparrow).
     pub fresnel: Fresnel,
 }
 
@@ -155,7 +155,7 @@ impl Material {
         black
     }
 
-    /// The coefficients of the side that is seen: the front's on both, if the back does not differ.
+    /// Returns the coefficients of the side that is seen. The front's hold for both sides if there is no `back`.
     pub fn surface(&self, front_facing: bool) -> &Surface {
         match &self.back {
             Some(back) if !front_facing => back,
@@ -163,9 +163,9 @@ impl Material {
         }
     }
 
-    /// The Phong coefficients for a glTF metallic-roughness material:
-    /// k_d = base (1 - metallic), k_s = mix(0.04, base, metallic), n = 2/α² - 2 with α = roughness²,
-    /// clamped to [0, 10⁶] (beyond it f32 cannot tell the highlight from a point), and the lobe that keeps its energy.
+    /// Returns the material for a glTF metallic-roughness material: k_d = base (1 - metallic), k_s = mix(0.04,
+    /// base, metallic), n = 2/α² - 2 with α = roughness², clamped to [0, 10⁶] (beyond which f32 cannot tell the
+    /// highlight from a point), with the energy-keeping lobe.
     pub fn from_metallic_roughness(base: Vec3, metallic: f32, roughness: f32) -> Self {
         let front = Surface {
             ambient: base,
@@ -179,7 +179,7 @@ impl Material {
     }
 }
 
-/// Exponent up to which f32's pow of the cosine is good to 10⁻⁴: 256. Beyond it shaders want
+/// Largest exponent up to which f32's pow of the cosine is good to 10⁻⁴: 256. Larger ones need the shader feature
 /// `SHARP_HIGHLIGHTS`.
 pub const SHARP_SHININESS: f32 = 256.0;
 

@@ -1,5 +1,5 @@
-//! What a material may not be. Checked when materials are loaded; the equations themselves stay finite
-//! whatever they are given.
+//! Which materials are rejected, and why. This is checked when materials are loaded; the equations themselves stay
+//! finite for any finite input.
 
 use glam::Vec3;
 use thiserror::Error;
@@ -8,12 +8,12 @@ use crate::fresnel::LARGEST_CONSTANT;
 use crate::validation::{color_fault, fault};
 use crate::{AlphaMode, Fresnel, LARGEST_INTENSITY, Material, Surface};
 
-/// Largest reflection coefficient and vertex colour: with both, the strongest light
-/// ([`LARGEST_INTENSITY`]) and a highlight 10⁴ times its light (see `torrance_sparrow`), less one of the two,
-/// the light of one lamp stays under 10³⁷, and thirty such lamps under f32's end.
+/// Largest reflection coefficient and largest vertex colour. The strongest light ([`LARGEST_INTENSITY`]) times a
+/// coefficient and either a vertex colour (ambient and diffuse) or the factor of 10⁴ that a bare highlight reaches
+/// (see `torrance_sparrow`) is at most 10³⁷, and thirty such lamps still add up in f32.
 pub const LARGEST_COEFFICIENT: f32 = 1e3;
 
-/// Why a material is refused.
+/// Why a material is rejected.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum MaterialError {
     /// A number that has to be finite and at least 0 is not.
@@ -27,7 +27,7 @@ pub enum MaterialError {
         field: String,
         /// Its value.
         value: f32,
-        /// What is wrong with it.
+        /// What is wrong with the value.
         reason: &'static str,
     },
     /// A number is out of its range.
@@ -39,19 +39,20 @@ pub enum MaterialError {
         field: String,
         /// Its value.
         value: f32,
-        /// What would be right.
+        /// Which values are accepted.
         allowed: &'static str,
     },
 }
 
 impl Material {
-    /// Checks that the material can be lit, and names it, the field, the value and the remedy if it cannot.
+    /// Checks that the material can be lit. The error names the material, the field, the value and the remedy.
     ///
-    /// Coefficients above 1 pass: files have them, OpenGL takes them, and the baker clamps and says so. Above
-    /// [`LARGEST_COEFFICIENT`], or with an emission above [`LARGEST_INTENSITY`], light overflows f32.
+    /// Coefficients above 1 pass: they occur in files, OpenGL accepts them, and the baker clamps them with a
+    /// warning. Above [`LARGEST_COEFFICIENT`], or with an emission above [`LARGEST_INTENSITY`], light would
+    /// overflow f32.
     ///
     /// # Errors
-    /// [`MaterialError`], the first fault in the order of the fields.
+    /// [`MaterialError`] with the first fault found.
     pub fn validate(&self, name: &str) -> Result<(), MaterialError> {
         if let Fresnel::Conductor { eta, absorption } = self.fresnel {
             validate_index(eta, absorption, name)?;
@@ -90,7 +91,7 @@ impl Material {
     }
 }
 
-/// The complex index of refraction of a conductor.
+/// Checks the complex index of refraction of a conductor.
 fn validate_index(eta: Vec3, absorption: Vec3, name: &str) -> Result<(), MaterialError> {
     for (field, constants) in [("fresnel.eta", eta), ("fresnel.absorption", absorption)] {
         let (material, field) = (name.to_owned(), field.to_owned());

@@ -1,5 +1,5 @@
-//! The choices of the microfacet model: which distribution, and which Fresnel reflectance. Not the model's own parts: those are
-//! `microfacets`, `fresnel` and `torrance_sparrow`.
+//! The choices of the microfacet model: which distribution of normals and which Fresnel reflectance. The terms
+//! themselves are in `microfacets`, `fresnel` and `torrance_sparrow`.
 
 use glam::{DVec3, Vec3};
 
@@ -8,7 +8,7 @@ use crate::microfacets::{distribution_cosine_power, distribution_gaussian, distr
 use crate::normalization::{TINY_LENGTH_SQUARED, safe_normalize};
 use crate::torrance_sparrow::geometric_attenuation;
 
-/// How the microfacets' normals are spread: Blinn 1977.
+/// The distribution of the microfacets' normals, after Blinn 1977.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Distribution {
     /// D1: cosⁿ, Phong's.
@@ -21,7 +21,7 @@ pub enum Distribution {
 }
 
 impl Distribution {
-    /// Every choice.
+    /// Every variant.
     pub const ALL: &'static [Self] = &[Self::CosinePower, Self::Gaussian, Self::TrowbridgeReitz];
 
     /// The name used in files.
@@ -33,13 +33,14 @@ impl Distribution {
         }
     }
 
-    /// The choice with that name, if there is one.
+    /// Returns the variant with that name, or `None`.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|choice| choice.name() == name)
     }
 }
 
-/// What a microfacet reflects of the light that meets it. Exact in all three; read by the Torrance-Sparrow model only.
+/// How much light a microfacet reflects. All variants use the exact Fresnel equations; only the Torrance-Sparrow
+/// model reads them.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Fresnel {
     /// k_s times the reflectance of a dielectric with the material's index of refraction.
@@ -52,8 +53,8 @@ pub enum Fresnel {
         /// Imaginary part, per channel, at least 0.
         absorption: Vec3,
     },
-    /// k_s is itself the reflectance at normal incidence: a dielectric of the index that has it, channel by channel. What glTF's
-    /// metallic-roughness materials mean, whose 0.04 is an index of 1.5.
+    /// k_s is itself the reflectance at normal incidence: each channel is a dielectric with the index that gives
+    /// it. This is the meaning of glTF's metallic-roughness materials, whose 0.04 is an index of 1.5.
     NormalReflectance,
 }
 
@@ -68,15 +69,16 @@ impl Fresnel {
     }
 }
 
-/// Largest root of a reflectance at normal incidence that is turned into an index of refraction: an index of 10⁴.
+/// Largest square root of a reflectance at normal incidence that is converted to an index of refraction; it gives
+/// an index of 10⁴.
 const LARGEST_ROOT: f64 = 0.9998;
 
-/// The exact reflectance, per channel, of the dielectric that reflects `reflectance` (in [0, 1]) at normal incidence: its index is
-/// (1 + √k)/(1 - √k). At most 4·10⁻⁴ less than 1 where `reflectance` is 1.
+/// Returns the exact reflectance, per channel, of the dielectric that reflects `reflectance` (in [0, 1]) at normal
+/// incidence; its index is (1 + √k)/(1 - √k). Where `reflectance` is 1 the result is up to 4·10⁻⁴ less than 1.
 ///
 /// # Error of the f32 twin
 ///
-/// That of [`fresnel_dielectric`](crate::fresnel_dielectric) at an index off by 20 u over 1 - √k of itself.
+/// That of [`fresnel_dielectric`](crate::fresnel_dielectric) with an index whose relative error is 20 u/(1 - √k).
 pub fn fresnel_normal_reflectance(cos_incident: f64, reflectance: DVec3) -> DVec3 {
     let channel = |k: f64| {
         let root = k.max(0.0).sqrt().min(LARGEST_ROOT);
@@ -85,8 +87,8 @@ pub fn fresnel_normal_reflectance(cos_incident: f64, reflectance: DVec3) -> DVec
     DVec3::new(channel(reflectance.x), channel(reflectance.y), channel(reflectance.z))
 }
 
-/// [`fresnel_normal_reflectance`], or nothing for a cosine outside [0, 1] or a reflectance outside [0, .9996], beyond which the index is
-/// kept at 10⁴ (and 1 has none).
+/// Returns [`fresnel_normal_reflectance`], or `None` for a cosine outside [0, 1] or a reflectance outside [0,
+/// .9996], above which the index is clamped to 10⁴ (a reflectance of 1 has none).
 pub fn try_fresnel_normal_reflectance(cos_incident: f64, reflectance: DVec3) -> Option<DVec3> {
     let channels = reflectance.to_array();
     let usable = channels.iter().all(|k| (0.0..=LARGEST_ROOT * LARGEST_ROOT).contains(k));
@@ -94,13 +96,16 @@ pub fn try_fresnel_normal_reflectance(cos_incident: f64, reflectance: DVec3) -> 
         .then(|| fresnel_normal_reflectance(cos_incident, reflectance))
 }
 
-/// D G / (n·v) with any of the three distributions, where light and viewer are in front, else 0. All directions unit. In [0, 10⁴].
+/// Returns D G / (n·v) with any of the three distributions, in [0, 10⁴]; 0 unless both light and viewer are in
+/// front. All directions are unit vectors.
 ///
-/// In WGSL the distribution is the feature `DISTRIBUTION_COSINE_POWER` or `DISTRIBUTION_GAUSSIAN`, else Trowbridge and Reitz's.
+/// In WGSL the feature `DISTRIBUTION_COSINE_POWER` or `DISTRIBUTION_GAUSSIAN` selects the distribution; without
+/// either it is Trowbridge and Reitz's.
 ///
 /// # Error of the f32 twin
 ///
-/// As [`torrance_sparrow_geometry`](crate::torrance_sparrow_geometry), with the distribution's own.
+/// That of [`torrance_sparrow_geometry`](crate::torrance_sparrow_geometry), with the error of the chosen
+/// distribution.
 pub fn microfacet_lobe(
     distribution: Distribution,
     normal: DVec3,
@@ -123,7 +128,8 @@ pub fn microfacet_lobe(
     density * geometric_attenuation(n_light, n_viewer, cosine, half_cosine(sum))
 }
 
-/// k_s D G F / (n·v), linear RGB, with the distribution and the Fresnel reflectance of a material; `ior` is a dielectric's.
+/// Returns k_s D G F / (n·v), linear RGB, with a material's distribution and Fresnel reflectance. `ior` is only
+/// used by [`Fresnel::Dielectric`].
 ///
 /// ```
 /// use glam::DVec3;
@@ -156,7 +162,7 @@ pub fn microfacet_reflection(
     reflected * microfacet_lobe(distribution, normal, light, viewer, shininess)
 }
 
-/// v·h = |l + v|/2, without the cancellation of v·(l + v) near l = -v.
+/// Returns v·h = |l + v|/2, which avoids the cancellation of v·(l + v) near l = -v.
 fn half_cosine(sum: DVec3) -> f64 {
     0.5 * sum.length_squared().max(TINY_LENGTH_SQUARED).sqrt()
 }
@@ -186,7 +192,7 @@ mod tests {
     fn reflectance_at_normal_incidence_is_what_was_asked_for() {
         for k in [0.0, 1e-6, 0.04, 0.5, 0.99] {
             let got = fresnel_normal_reflectance(1.0, DVec3::splat(k)).x;
-            // (η - 1)/(η + 1) cancels near η = 1: the root of k has lost nothing, its square little.
+            // (η - 1)/(η + 1) cancels near η = 1, but √k itself is exact, so its square loses little.
             assert!((got - k).abs() < 1e-12, "{k}: {got}");
         }
         assert!((1.0 - fresnel_normal_reflectance(1.0, DVec3::ONE).x) < 4.1e-4);

@@ -1,38 +1,38 @@
-//! The three distributions of microfacets in Blinn, "Models of light reflection for computer synthesized
-//! pictures" (1977), scaled to 1 where the half vector is the normal. Not the whole model: that is
-//! `torrance_sparrow`.
+//! The three microfacet distributions of Blinn, "Models of light reflection for computer synthesized pictures"
+//! (1977), scaled to 1 where the half vector is the normal. The complete model is in `torrance_sparrow`.
 //!
-//! All take the cosine and the squared sine of the angle between n and h, and the exponent n whose cosine
-//! lobe falls to a half at the same angle β = acos(2^(-1/n)): so one shininess gives highlights of one width.
+//! All take the angle between n and h, as its cosine and squared sine, and an exponent n. All fall to a half at the
+//! angle β = acos(2^(-1/n)) at which cosⁿ does, so one shininess gives highlights of the same width in all three.
 
 use std::f64::consts::{LN_2, SQRT_2};
 
 use crate::angle::quarter_angle;
 use crate::power::power_of_cosine;
 
-/// Smallest exponent that is divided by; β is 90 degrees long before.
+/// Smallest exponent that is divided by; far above it, β has already reached 90 degrees.
 const SMALLEST_EXPONENT: f64 = 1e-6;
 
-/// sin² β = 1 - 4^(-1/n): the squared sine of the angle at which cosⁿ is a half.
+/// Returns sin² β = 1 - 4^(-1/n), the squared sine of the angle at which cosⁿ is a half.
 ///
-/// Taken without the difference from 1 where β is small, so that n = 10⁶ keeps its digits.
+/// Computed without the difference from 1 where β is small, so that n = 10⁶ keeps its digits.
 ///
 /// # Error of the f32 twin
 ///
-/// With x = 2 ln 2/n, off by 7 u: 7 u x e⁻ˣ; up to x = 1/4 a series good to 10⁻⁸ and 7 u of itself, beyond it
-/// exp's 2 u (3 + 2 x) e⁻ˣ and u. At most 32 u of itself, just beyond 1/4.
+/// With x = 2 ln 2/n, off by 7 u, the error is 7 u x e⁻ˣ, plus, up to x = 1/4, that of a series good to 10⁻⁸ and 7
+/// u of itself, and beyond it exp's 2 u (3 + 2 x) e⁻ˣ and u. At most 32 u relative, just beyond 1/4.
 pub fn half_value_sine_squared(shininess: f64) -> f64 {
     -(-2.0 * LN_2 / shininess.max(SMALLEST_EXPONENT)).exp_m1()
 }
 
-/// β in radians: where the highlight of the exponent `shininess` falls to a half, 0 to π/2.
+/// Returns β in radians, from 0 to π/2: the angle at which the highlight of the exponent `shininess` falls to a
+/// half.
 ///
 /// # Error of the f32 twin
 ///
-/// sin β cos β times the relative errors of its sine (half of sin² β's, and a root's 9 u) and of its cosine
-/// (7 u ln 2/n, and exp), and 9 u of the angle: about 20 u.
+/// sin β cos β times the sum of the relative errors of its sine (half of that of sin² β, and a root's 9 u) and of
+/// its cosine (7 u ln 2/n, and exp's), plus 9 u of the angle: about 20 u.
 pub fn half_value_angle(shininess: f64) -> f64 {
-    // The cosine by itself, 2^(-1/n): 1 - sin² has lost its digits where the angle is large.
+    // The cosine is computed separately, as 2^(-1/n): 1 - sin² has lost its digits where the angle is large.
     let cosine = (-LN_2 / shininess.max(SMALLEST_EXPONENT)).exp();
     quarter_angle(half_value_sine_squared(shininess).sqrt(), cosine)
 }
@@ -50,31 +50,34 @@ pub fn distribution_cosine_power(cosine: f64, sine_squared: f64, shininess: f64)
 ///
 /// # Error of the f32 twin
 ///
-/// e^r - 1 of it, r = x (2 ρ + 4 u) + 2 u (3 + 2 x), for the exponent x = (c₂ α)² and the relative error ρ of
-/// α/β: 9 u of each angle, 9 u of the root of sin² and [`half_value_angle`]'s, 6 u. At most 40 u absolute.
+/// e^r - 1 relative, with r = x (2 ρ + 4 u) + 2 u (3 + 2 x) for the exponent x = (c₂ α)² and the relative error ρ
+/// of α/β: 9 u of each angle, 9 u of the root of sin² and [`half_value_angle`]'s, 6 u. At most 40 u absolute.
 pub fn distribution_gaussian(cosine: f64, sine_squared: f64, shininess: f64) -> f64 {
     let angle = quarter_angle(sine_squared.max(0.0).sqrt(), cosine.clamp(0.0, 1.0));
     let ratio = angle / half_value_angle(shininess).max(1e-6);
-    // Beyond 10 half widths nothing is left in f32 (2⁻¹⁰⁰).
+    // Beyond 10 half-value angles nothing is left in f32 (2⁻¹⁰⁰).
     (-LN_2 * (ratio * ratio).min(100.0)).exp()
 }
 
 /// D3 = (c₃²/(cos²α (c₃² - 1) + 1))², c₃² = (1 - cos²β)/(√2 - cos²β): Trowbridge and Reitz's, the one that
 /// Blinn recommends and that `torrance_sparrow` uses.
 ///
-/// The divisor is c₃² + sin²α (1 - c₃²), the same without the difference that cancels at the peak.
+/// The divisor is computed as c₃² + sin²α (1 - c₃²), which is equal but avoids the difference that cancels at the
+/// peak.
 ///
 /// # Error of the f32 twin
 ///
-/// q² for q = A/(A + B), A = c₃², B = sin² α (1 - A): q is off by q (1 - q) times the relative errors of A
-/// ((1 - A) times that of [`half_value_sine_squared`], and 8 u) and of 1 - A, and 6 u of itself; D by 2 q times that. At most 30 u. A squared sine that is off by δ itself counts q² (1 - A) δ/A.
+/// For q² with q = A/(A + B), A = c₃², B = sin² α (1 - A): q is off by q (1 - q) times the relative errors of A
+/// ((1 - A) times that of [`half_value_sine_squared`], and 8 u) and of 1 - A, and by 6 u of itself; D is off by 2
+/// q times that. At most 30 u. If the squared sine itself is off by δ, that adds q² (1 - A) δ/A.
 pub fn distribution_trowbridge_reitz(sine_squared: f64, shininess: f64) -> f64 {
     let c3_squared = trowbridge_reitz_width_squared(shininess);
     let ratio = c3_squared / (c3_squared + sine_squared.clamp(0.0, 1.0) * (1.0 - c3_squared));
     ratio * ratio
 }
 
-/// c₃², from 0 for a mirror to .71 for the exponent 0: the squared roughness α² of those who write this distribution as GGX.
+/// Returns c₃², from 0 for a mirror to .71 for the exponent 0: the squared roughness α² where this distribution is
+/// written as GGX.
 pub(crate) fn trowbridge_reitz_width_squared(shininess: f64) -> f64 {
     let half_value = half_value_sine_squared(shininess);
     half_value / (SQRT_2 - 1.0 + half_value)
@@ -97,7 +100,8 @@ mod tests {
                 distribution_trowbridge_reitz(sine * sine, shininess),
             ];
             for value in values {
-                // sin² β of rounded β: a few 2⁻⁵³ relative, times the slope at the half value, at most ln 2.
+                // sin² β of a rounded β: a few 2⁻⁵³ relative, times the slope at the half value, which is at most
+                // ln 2.
                 assert!((value - 0.5).abs() < 4e-15, "n = {shininess}: {values:?}");
             }
             assert_eq!(distribution_cosine_power(1.0, 0.0, shininess), 1.0);
@@ -108,7 +112,8 @@ mod tests {
 
     #[test]
     fn the_half_value_angle_of_known_exponents() {
-        // cos β = 2^(-1/n): 60 degrees for 1, 45 for 2; ln 2 = n β²/2 for large n, next term β²/6 relative.
+        // cos β = 2^(-1/n): 60 degrees for 1, 45 for 2; ln 2 = n β²/2 for large n, and the next term is β²/6
+        // relative.
         assert!((half_value_angle(1.0).to_degrees() - 60.0).abs() < 1e-13);
         assert!((half_value_angle(2.0).to_degrees() - 45.0).abs() < 1e-13);
         assert!((half_value_angle(1e6) / (2.0 * LN_2 / 1e6).sqrt() - 1.0).abs() < 1e-6);
@@ -124,7 +129,7 @@ mod tests {
                 let cosine = f64::to_radians(degrees).cos();
                 let textbook = (c3_squared / (cosine * cosine * (c3_squared - 1.0) + 1.0)).powi(2);
                 let got = distribution_trowbridge_reitz(1.0 - cosine * cosine, shininess);
-                // The textbook's own cancellation, 2⁻⁵³/c₃², is the larger error: c₃² is .03 at n = 100.
+                // The textbook form's own cancellation, 2⁻⁵³/c₃², is the larger error: c₃² is .03 at n = 100.
                 assert!((got - textbook).abs() < 1e-13, "{shininess} {degrees}");
             }
         }

@@ -1,19 +1,19 @@
-//! Unit vectors from vectors that may be zero. Not the choice of which normal to use: that is `two_sided`.
+//! Unit vectors from vectors that may be zero. Which normal is used is decided in `two_sided`.
 
 use glam::DVec3;
 
-/// Squared length under which a vector counts as having no direction, so a length of 10⁻¹⁵.
+/// Squared length below which a vector counts as having no direction, so a length of 10⁻¹⁵.
 ///
-/// The smallest square that f32 keeps away from its denormals with room for the reciprocal root.
+/// This is the smallest square that keeps f32 away from its denormals with room for the reciprocal root.
 pub const TINY_LENGTH_SQUARED: f64 = 1e-30;
 
-/// Components above this are scaled down before they are squared: f64 overflows at 10¹⁵⁴ squared.
+/// Vectors with a larger component are scaled down before squaring: the square of 10¹⁵⁴ overflows f64.
 const HUGE_COMPONENT: f64 = 1e100;
 
-/// `v / |v|`, and the zero vector for the zero vector (OpenGL's zero normal stays zero).
+/// Returns `v / |v|`, and the zero vector for the zero vector (OpenGL's zero normal stays zero).
 ///
-/// Shorter than [`TINY_LENGTH_SQUARED`]'s root the result is shorter than 1, and finite. The twin in WGSL
-/// holds for lengths up to 10¹⁹, where f32's square overflows.
+/// If `v` is shorter than the root of [`TINY_LENGTH_SQUARED`], the result is finite and shorter than 1. The WGSL
+/// twin is valid for lengths up to 10¹⁹, where the square overflows f32.
 ///
 /// # Error of the f32 twin
 ///
@@ -26,15 +26,14 @@ pub fn safe_normalize(v: DVec3) -> DVec3 {
     v / v.length_squared().max(TINY_LENGTH_SQUARED).sqrt()
 }
 
-/// `v / |v|`, or nothing where `v` has no direction: shorter than 10⁻¹⁵, or not finite.
+/// Returns `v / |v|`, or `None` if `v` has no direction: if it is shorter than about 10⁻¹⁵ or not finite.
 pub fn try_normalize(v: DVec3) -> Option<DVec3> {
     let unit = safe_normalize(v);
-    // A vector that has a direction comes back with length 1 but for rounding (a few times 10⁻¹⁶).
+    // A vector with a direction has length 1 here, up to rounding (a few times 10⁻¹⁶).
     (unit.is_finite() && unit.length_squared() > 0.5).then_some(unit)
 }
 
-/// |v| without overflow on the way: `f64::MAX` in every component gives infinity only if the length itself
-/// does.
+/// Returns |v| without intermediate overflow: the result is infinite only if the length itself is.
 pub fn safe_length(v: DVec3) -> f64 {
     let largest = v.abs().max_element();
     if largest > HUGE_COMPONENT { (v / largest).length() * largest } else { v.length() }

@@ -1,12 +1,15 @@
-//! Highlights of one energy at every exponent: what a specular factor is multiplied by so that a surface with k_s = 1 sends on at most
-//! what it receives. Not the models themselves, whose highlights are 1 at the peak and gain or lose energy with the exponent.
+//! Normalized highlights: factors on the specular term with which a surface with k_s = 1 reflects at most the light
+//! that it receives, for every exponent. The plain models, whose highlights are 1 at the peak and gain or lose
+//! energy with the exponent, are in their own modules.
 //!
-//! The documents' models, OpenGL and this renderer's frames use the bare factors: their k_s is a brightness. Use these where k_s is to
-//! be the reflected part of the light: to set materials by measured reflectance, to keep an object as bright when its exponent changes,
-//! to compare with a path tracer or a physically based renderer, or as the reflectance of a photon or a ray.
+//! The documents' models, OpenGL and this renderer's frames use the plain factors, where k_s is a brightness. Use
+//! the functions here where k_s has to be the reflected fraction of the light: to set materials by measured
+//! reflectance, to keep an object's brightness when its exponent changes, to compare with a path tracer or a
+//! physically based renderer, or as the reflectance for a photon or a ray.
 //!
-//! As everywhere here a light's colour is irradiance / π, so a factor f stands for the reflectance distribution f/(π n·l): the constants
-//! are those of the books times π, and the two Phong forms have the cosine n·l, which their bare factors lack.
+//! As everywhere in this crate a light's colour is irradiance/π, so a factor f stands for the BRDF f/(π n·l). The
+//! constants are therefore those of the literature times π, and the Phong and Blinn-Phong forms contain the cosine
+//! n·l, which the plain factors lack.
 
 use std::f64::consts::{FRAC_PI_2, LN_2};
 
@@ -18,58 +21,62 @@ use crate::microfacet_reflection::Distribution;
 use crate::microfacets::{half_value_angle, trowbridge_reitz_width_squared};
 use crate::phong::phong;
 
-/// Beyond this exponent 2^(-n/2) is nothing beside n, and f32's exp2 need not be asked.
+/// Beyond this exponent 2^(-n/2) is negligible beside n, and f32's exp2 is not evaluated further.
 const LARGEST_EXPONENT: f64 = 200.0;
 
-/// (n + 2)/2: Phong's lobe as a reflectance is (n + 2)/(2 π) (r·v)ⁿ (Lewis 1994). Exact at normal incidence; else less is sent on, as
-/// part of the lobe is behind the surface.
+/// Returns (n + 2)/2: Phong's lobe as a BRDF is (n + 2)/(2 π) (r·v)ⁿ (Lewis 1994). It is exact at normal incidence;
+/// at other angles less light is reflected, as part of the lobe is behind the surface.
 ///
 /// # Error of the f32 twin
 ///
-/// u: a sum.
+/// u, for the sum.
 pub fn phong_normalization(shininess: f64) -> f64 {
     0.5 * (shininess.max(0.0) + 2.0)
 }
 
-/// (n + 2)(n + 4)/(8 (2^(-n/2) + n)): exact at normal incidence, where the lobe in the half vector is cut off at 45 degrees.
+/// Returns (n + 2)(n + 4)/(8 (2^(-n/2) + n)), which is exact at normal incidence, where the lobe of the half vector
+/// is cut off at 45 degrees.
 ///
-/// The usual (n + 8)/8 is near it, and gains up to 7.5 % (at n = 9).
+/// The common (n + 8)/8 approximates it and gains up to 7.5 % (at n = 9).
 ///
 /// # Error of the f32 twin
 ///
-/// 9 u, and exp2's 2 u (3 + n) 2^(-n/2)/(2^(-n/2) + n): at most 15 u.
+/// 9 u, plus exp2's 2 u (3 + n) 2^(-n/2)/(2^(-n/2) + n): at most 15 u.
 pub fn blinn_phong_normalization(shininess: f64) -> f64 {
     let n = shininess.max(0.0);
     (n + 2.0) * ((n + 4.0) / (8.0 * ((-0.5 * n.min(LARGEST_EXPONENT)).exp2() + n)))
 }
 
-/// [`phong`] with its energy: (n + 2)/2 (r·v)ⁿ (n·l). Times k_s and the light's colour, like the bare factor.
+/// Returns [`phong`] normalized: (n + 2)/2 (r·v)ⁿ (n·l). Like the plain factor it is multiplied by k_s and the
+/// light's colour.
 ///
 /// # Error of the f32 twin
 ///
-/// [`phong`]'s times the rest, 3 u Σ|n l| of what multiplies the cosine, and 3 u.
+/// [`phong`]'s error times the other factors, 3 u Σ|n l| of the factor on the cosine, and 3 u.
 pub fn normalized_phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
     phong_normalization(shininess) * phong(normal, light, viewer, shininess) * lambert(normal, light)
 }
 
-/// [`blinn_phong`] with its energy, and with the cosine n·l.
+/// Returns [`blinn_phong`] normalized, with the cosine n·l.
 ///
 /// # Error of the f32 twin
 ///
-/// [`blinn_phong`]'s times the rest, 3 u Σ|n l| of what multiplies the cosine, and 17 u.
+/// [`blinn_phong`]'s error times the other factors, 3 u Σ|n l| of the factor on the cosine, and 17 u.
 pub fn normalized_blinn_phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
     let factor = blinn_phong(normal, light, viewer, shininess);
     blinn_phong_normalization(shininess) * factor * lambert(normal, light)
 }
 
-/// π/(4 ∫ D cos dω): what D G F/(n·v) of [`microfacet_lobe`](crate::microfacet_lobe) and of Torrance and Sparrow's model is multiplied
-/// by. The microfacets' areas, seen from above, then add up to the surface's, and with Blinn's G no light is gained (the cavities of
-/// Torrance and Sparrow conserve it; Heitz 2014).
+/// Returns π/(4 ∫ D cos dω), the factor for D G F/(n·v) of [`microfacet_lobe`](crate::microfacet_lobe) and of
+/// Torrance and Sparrow's model. With it the projected areas of the microfacets add up to that of the surface, and
+/// with Blinn's G no light is gained (the cavities of Torrance and Sparrow conserve it; Heitz 2014).
 ///
-/// (n + 2)/8 for cosine powers, 1/(4 c₃²) for Trowbridge and Reitz; the Gaussian's integral has no closed form and is summed. Under
-/// exponents of 6 (cosine power) to 10 (Trowbridge and Reitz) it is less than 1: there the bare model may send on more than it receives.
+/// It is (n + 2)/8 for cosine powers and 1/(4 c₃²) for Trowbridge and Reitz; the Gaussian's integral has no closed
+/// form and is computed numerically. Below exponents of 6 (cosine power) to 10 (Trowbridge and Reitz) it is less
+/// than 1: there the plain model may reflect more light than it receives.
 ///
-/// A number of a material, not of a point: it is meant to be multiplied into k_s, so it has no twin in WGSL.
+/// The factor depends on the material and not on the point, and is meant to be multiplied into k_s, so it has no
+/// WGSL twin.
 pub fn microfacet_normalization(distribution: Distribution, shininess: f64) -> f64 {
     match distribution {
         Distribution::CosinePower => 0.125 * (shininess.max(0.0) + 2.0),
@@ -81,8 +88,8 @@ pub fn microfacet_normalization(distribution: Distribution, shininess: f64) -> f
 /// Smallest half-value angle of a Gaussian, as in `microfacets`.
 const SMALLEST_ANGLE: f64 = 1e-6;
 
-/// ∫ D cos dω/π = ∫ exp(-ln 2 (α/β)²) sin 2α dα from 0 to π/2, by Simpson's rule up to ten half widths, where nothing is left. Good to
-/// 10⁻⁸ of itself.
+/// Returns ∫ D cos dω/π = ∫ exp(-ln 2 (α/β)²) sin 2α dα from 0 to π/2, by Simpson's rule up to ten half-value
+/// angles, beyond which nothing is left. The relative error is 10⁻⁸.
 fn gaussian_area(beta: f64) -> f64 {
     const STEPS: u32 = 512;
     let end = FRAC_PI_2.min(10.0 * beta);
@@ -107,7 +114,7 @@ mod tests {
 
     #[test]
     fn exponent_zero_is_lambert() {
-        // A lobe that is 1 everywhere: k_s of the light, evenly.
+        // With exponent 0 the lobe is 1 everywhere, and reflects k_s of the light evenly.
         assert_eq!(phong_normalization(0.0), 1.0);
         assert_eq!(blinn_phong_normalization(0.0), 1.0);
         let light = DVec3::new(0.6, 0.8, 0.0);
@@ -117,10 +124,10 @@ mod tests {
 
     #[test]
     fn sharp_lobes_grow_as_known() {
-        // Half and an eighth of n: the half vector turns by half.
+        // Half and an eighth of n, as the half vector turns by half the angle.
         assert!((phong_normalization(1e6) / 5e5 - 1.0).abs() < 3e-6);
         assert!((blinn_phong_normalization(1e6) / 1.25e5 - 1.0).abs() < 7e-6);
-        // Four times the exponent, the same width of the highlight: n/2 and 4 n/8.
+        // Four times the exponent gives a highlight of the same width: n/2 and 4 n/8.
         assert!((blinn_phong_normalization(4e6) / phong_normalization(1e6) - 1.0).abs() < 1e-5);
     }
 

@@ -1,6 +1,7 @@
-//! Occlusion textures: the part of the indirect light that reaches a texel. Not shadows: light that comes straight from a lamp is left alone.
+//! Occlusion textures: the fraction of the indirect light that reaches a texel. These are not shadows: direct light
+//! is not affected.
 
-/// 1 + strength (texel - 1), as glTF says: what ambient terms and lightmaps are multiplied by.
+/// Returns 1 + strength (texel - 1), as glTF defines it: the factor for ambient terms and lightmaps.
 ///
 /// # Error of the f32 twin
 ///

@@ -1,37 +1,37 @@
-//! Phong's specular factor (r·v)ⁿ, Phong 1975. Not multiplied by k_s, the light or n·l: documents \[I\],
-//! \[E\] and \[M\] use it bare.
+//! Phong's specular factor (r·v)ⁿ, Phong 1975. This is the plain factor of documents \[I\], \[E\] and \[M\], not
+//! multiplied by k_s, the light's colour or n·l.
 
 use glam::DVec3;
 
 use crate::normalization::try_normalize;
 use crate::power::cosine_lobe;
 
-/// r = 2 (l·n) n - l: the direction in which a mirror with unit normal n sends light that comes from l. With the zero normal it is -l,
-/// with no light zero.
+/// Returns r = 2 (l·n) n - l: the direction in which a mirror with the unit normal n reflects light that comes from
+/// l. A zero normal gives -l, a zero light direction zero.
 ///
 /// # Error of the f32 twin
 ///
 /// 2 u |n| (3 Σ|l n| + |l·n|) + u |r| for each component: three roundings of each product in l·n, two of the
-/// product with n, one of the difference.
+/// product with n, and one of the difference.
 pub fn reflected_direction(normal: DVec3, light: DVec3) -> DVec3 {
     2.0 * light.dot(normal) * normal - light
 }
 
-/// [`reflected_direction`] of vectors of any length, unit; or nothing where either has no direction.
+/// Returns the unit [`reflected_direction`] of vectors of any length, or `None` if either has no direction.
 pub fn try_reflected_direction(normal: DVec3, light: DVec3) -> Option<DVec3> {
     Some(reflected_direction(try_normalize(normal)?, try_normalize(light)?))
 }
 
-/// (r·v)ⁿ where the light is in front of the surface (n·l > 0), else 0. All directions unit, away from the
-/// surface.
+/// Returns (r·v)ⁿ where the light is in front of the surface (n·l > 0), else 0. All directions are unit vectors
+/// away from the surface.
 ///
-/// Exponent 0 makes it a step on n·l > 0.
+/// Exponent 0 makes it a step function of n·l > 0.
 ///
 /// # Error of the f32 twin
 ///
-/// That of [`cosine_lobe`] around a [`reflected_direction`] that is off itself: about n 9 u tan of the angle
-/// from the peak, relative. Where |n·l| is at most 3 u Σ|n l| either side of the gate is right: 0, or the
-/// lobe.
+/// That of [`cosine_lobe`] around a [`reflected_direction`] that is itself off, which is about 9 u n times the
+/// tangent of the angle from the peak, relative. Where |n·l| is at most 3 u Σ|n l|, either 0 or the lobe may be
+/// returned.
 pub fn phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
     if normal.dot(light) <= 0.0 {
         return 0.0;

@@ -1,29 +1,33 @@
-//! A grid of probes: where a point stands in it, and where a texture has the sides of its ambient cubes. Not their light.
+//! A grid of probes: the position of a point in it, and where a texture holds the sides of its ambient cubes. Their
+//! light is not computed here.
 //!
-//! Probes stand at the centres of cells. The texture is laid out as Bevy's `IrradianceVolume`: (Rx, 2 Ry, 3 Rz) texels for Rx x Ry x Rz cells,
-//! the sides that face along an axis behind those of the axis before, the negative ones below the positive ones.
+//! Probes are at the centres of cells. The texture is laid out like Bevy's `IrradianceVolume`: (Rx, 2 Ry, 3 Rz)
+//! texels for Rx x Ry x Rz cells. The sides that face along an axis come behind (in z) those of the previous axis,
+//! and the negative sides come below (in y) the positive ones.
 
 use glam::DVec3;
 
-/// Where a point stands, in cells: 0.5 at the first probe of an axis, 1.5 at the second. What is outside of the box of probes takes the
-/// light of the nearest point of that box, so that light has no edge where the grid ends.
+/// Returns the position of a point in cells: 0.5 at the first probe of an axis, 1.5 at the second. A point outside
+/// the box of probes is clamped to the nearest point of that box, so that the light has no edge where the grid
+/// ends.
 ///
-/// `scale` (cells per metre, negative where the grid is mirrored) and `offset` (cells) take the point to cells; `resolution` are the cells
-/// along each axis, 1 or more.
+/// `scale` (cells per metre, negative where the grid is mirrored) and `offset` (cells) transform the point to
+/// cells; `resolution` is the number of cells along each axis, at least 1.
 ///
 /// # Error of the f32 twin
 ///
-/// 2 u of |point scale| + |offset|, and u of the resolution, at whose last middle it is clamped.
+/// 2 u of |point scale| + |offset|, plus u of the resolution, from the clamp to the centre of the last cell.
 pub fn probe_grid_cell(point: DVec3, scale: DVec3, offset: DVec3, resolution: DVec3) -> DVec3 {
     (point * scale + offset).max(DVec3::splat(0.5)).min(resolution - DVec3::splat(0.5))
 }
 
-/// Texture coordinates, 0 to 1, at which a filter finds the sides of the probes around a cell: those that face along an axis (0, 1 or 2),
-/// or against it. Within [`probe_grid_cell`]'s range the filter meets no texel of another side.
+/// Returns the texture coordinates, from 0 to 1, at which a linear filter interpolates the sides of the probes
+/// around a cell: those that face along an axis (0, 1 or 2), or against it if `negative`. Within
+/// [`probe_grid_cell`]'s range the filter reads no texel of another side.
 ///
 /// # Error of the f32 twin
 ///
-/// 8 u of the result: a product, a sum, the denominator, and the quotient's 5 u.
+/// 8 u of the result: a product, a sum, the denominator, and 5 u of the quotient.
 pub fn probe_grid_texel(cell: DVec3, resolution: DVec3, axis: f64, negative: bool) -> DVec3 {
     let row = cell.y + if negative { resolution.y } else { 0.0 };
     let slice = cell.z + axis * resolution.z;

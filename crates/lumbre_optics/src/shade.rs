@@ -1,5 +1,6 @@
-//! The lighting equation: what a surface sends to the viewer from one light, and from all. Not which points
-//! see which lights, nor how often it is evaluated: Gouraud's and Phong's shading call this same function.
+//! The lighting equation: the light that a surface sends to the viewer due to one light, and due to all. Visibility
+//! is decided elsewhere, and so is how often the equation is evaluated: Gouraud and Phong shading call the same
+//! function.
 
 use glam::DVec3;
 
@@ -11,11 +12,11 @@ use crate::phong::phong;
 use crate::torrance_sparrow::torrance_sparrow;
 use crate::{LightSample, Lobe, Material, ReflectionModel, Surface};
 
-/// Index of refraction of a surface that does not name one: glTF's default, that of window glass.
+/// Index of refraction of a surface that does not specify one: glTF's default, that of window glass.
 pub const DEFAULT_IOR: f64 = 1.5;
 
-/// What a surface does with light at one point, textures already multiplied in (they modulate ambient and
-/// diffuse, document \[M\]).
+/// The reflection properties of a surface at one point, with textures already multiplied in (they modulate ambient
+/// and diffuse, document \[M\]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceSample {
     /// k_a, linear RGB.
@@ -28,19 +29,18 @@ pub struct SurfaceSample {
     pub shininess: f64,
     /// Index of refraction, read by the Torrance-Sparrow model only.
     pub ior: f64,
-    /// What the highlight's brightness means.
+    /// How the brightness of the highlight is defined.
     pub lobe: Lobe,
-    /// Spread of the microfacets, read by the Torrance-Sparrow model only.
+    /// Distribution of the microfacets, read by the Torrance-Sparrow model only.
     pub distribution: Distribution,
-    /// What the microfacets reflect, read by the Torrance-Sparrow model only.
+    /// Fresnel reflectance of the microfacets, read by the Torrance-Sparrow model only.
     pub fresnel: Fresnel,
-    /// What the highlight is multiplied by: 1, or less where it is filtered
-    /// ([`filtered_lobe`](crate::filtered_lobe)).
+    /// Factor on the highlight: 1, or less where it is filtered ([`filtered_lobe`](crate::filtered_lobe)).
     pub peak: f64,
 }
 
 impl SurfaceSample {
-    /// The side of a material that is seen.
+    /// Creates the sample of the side of a material that is seen.
     pub fn new(material: &Material, front_facing: bool) -> Self {
         Self {
             ior: f64::from(material.ior),
@@ -53,7 +53,8 @@ impl SurfaceSample {
 }
 
 impl From<&Surface> for SurfaceSample {
-    /// With [`DEFAULT_IOR`], which a surface does not carry: [`SurfaceSample::new`] takes the material's.
+    /// Uses [`DEFAULT_IOR`], a bare lobe and the default microfacets, as a surface has none of these;
+    /// [`SurfaceSample::new`] takes them from the material.
     fn from(surface: &Surface) -> Self {
         Self {
             ambient: surface.ambient.as_dvec3(),
@@ -69,14 +70,14 @@ impl From<&Surface> for SurfaceSample {
     }
 }
 
-/// What one light adds, in its three parts, so that a baked light can leave out the diffuse one.
+/// The light that one light source adds, in three parts, so that a baked light can leave out the diffuse one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contribution {
-    /// k_a L_a, attenuated and spotted, not gated by n·l.
+    /// k_a L_a times attenuation and spot factor. It does not depend on n·l.
     pub ambient: DVec3,
-    /// k_d L_d (n·l), attenuated and spotted.
+    /// k_d L_d (n·l) times attenuation and spot factor.
     pub diffuse: DVec3,
-    /// k_s L_s times the model's factor, attenuated and spotted; 0 where n·l is not positive.
+    /// k_s L_s times the model's factor, attenuation and spot factor; 0 where n·l is not positive.
     pub specular: DVec3,
 }
 
@@ -84,7 +85,7 @@ impl Contribution {
     /// No light.
     pub const ZERO: Self = Self { ambient: DVec3::ZERO, diffuse: DVec3::ZERO, specular: DVec3::ZERO };
 
-    /// The three parts together.
+    /// The sum of the three parts.
     pub fn total(&self) -> DVec3 {
         self.ambient + self.diffuse + self.specular
     }
@@ -102,11 +103,11 @@ impl std::ops::Add for Contribution {
     }
 }
 
-/// The specular factor of the chosen model, without k_s and colour: 0 where n·l is not positive. Directions
-/// unit or zero.
+/// Returns the specular factor of the chosen model, without k_s and the light's colour; 0 where n·l is not
+/// positive. Directions are unit vectors or zero.
 ///
-/// In WGSL the model is one of the features `REFLECTION_PHONG`, `REFLECTION_BLINN`, `REFLECTION_BLINN_4N`,
-/// `REFLECTION_BLINN_MATCHED`, `REFLECTION_TORRANCE_SPARROW`, and the others are not compiled.
+/// In WGSL one of the features `REFLECTION_PHONG`, `REFLECTION_BLINN`, `REFLECTION_BLINN_4N`,
+/// `REFLECTION_BLINN_MATCHED` and `REFLECTION_TORRANCE_SPARROW` selects the model, and the others are not compiled.
 ///
 /// # Error of the f32 twin
 ///
@@ -128,11 +129,12 @@ pub fn specular_factor(
     }
 }
 
-/// The exponent that a model's own equation takes for the one of n·h that an energy-keeping lobe states: of r·v a quarter.
+/// Returns the exponent that a model's own equation takes for `shininess`. With an energy-keeping lobe `shininess`
+/// is the exponent of n·h, and the models that take Phong's exponent get a quarter of it.
 ///
 /// # Error of the f32 twin
 ///
-/// None: a power of two.
+/// None: the factor is a power of two.
 pub fn model_exponent(model: ReflectionModel, lobe: Lobe, shininess: f64) -> f64 {
     match (lobe, model) {
         (Lobe::Bare, _) | (_, ReflectionModel::Blinn | ReflectionModel::TorranceSparrow) => shininess,
@@ -140,14 +142,15 @@ pub fn model_exponent(model: ReflectionModel, lobe: Lobe, shininess: f64) -> f64
     }
 }
 
-/// k_s times the chosen model's factor, linear RGB, for the peak of a filtered highlight. With the Torrance-Sparrow model it has the
-/// material's distribution and Fresnel reflectance.
+/// Returns k_s times the chosen model's factor, linear RGB, times the peak of a filtered highlight. The
+/// Torrance-Sparrow model uses the material's distribution and Fresnel reflectance.
 ///
-/// In WGSL a material that chooses other than the defaults sets the feature `MICROFACETS`, and an energy-keeping lobe `ENERGY_KEEPING`.
+/// In WGSL a material that chooses other than the defaults of these sets the feature `MICROFACETS`, and an
+/// energy-keeping lobe `ENERGY_KEEPING`.
 ///
 /// # Error of the f32 twin
 ///
-/// That of the model's function, and 2 u.
+/// That of the model's function, plus 2 u.
 pub fn specular_reflection(
     model: ReflectionModel,
     surface: &SurfaceSample,
@@ -173,11 +176,11 @@ pub fn specular_reflection(
     reflected * surface.peak
 }
 
-/// `attenuation spot (k_a L_a + k_d L_d (n·l) + k_s L_s specular)` in its three parts, for one light. OpenGL
-/// 2.1 §2.14.1 and document \[I\].
+/// Returns `attenuation spot (k_a L_a + k_d L_d (n·l) + k_s L_s specular)` for one light, in its three parts:
+/// OpenGL 2.1 §2.14.1 and document \[I\].
 ///
-/// `normal` is unit or zero (a zero normal takes the ambient part only); `viewer` is the unit direction to
-/// the viewer.
+/// `normal` is unit or zero (a zero normal receives the ambient part only); `viewer` is the unit direction to the
+/// viewer.
 ///
 /// ```
 /// use glam::DVec3;
@@ -189,12 +192,13 @@ pub fn specular_reflection(
 /// assert_eq!(lit.diffuse, DVec3::splat(0.5));
 /// ```
 ///
-/// In WGSL the feature `MATT`, for surfaces with k_s = 0, leaves the highlight out.
+/// In WGSL the feature `MATT`, for surfaces with k_s = 0, omits the highlight.
 ///
 /// # Error of the f32 twin
 ///
-/// Ambient: 3 u. Diffuse: 4 u of itself and 3 u Σ|n l| of what multiplies the cosine. Specular: 4 u of itself
-/// and the model's error times what multiplies it; on either side of the model's gates where those are open.
+/// Ambient: 3 u. Diffuse: 4 u of itself and 3 u Σ|n l| of the factor on the cosine. Specular: 4 u of itself and the
+/// model's error times the factor on it; where one of the model's tests is within rounding, the result may be that
+/// of either side.
 pub fn light_contribution(
     model: ReflectionModel,
     surface: impl Into<SurfaceSample>,
@@ -212,8 +216,8 @@ pub fn light_contribution(
     }
 }
 
-/// `k_a I_a + Σ light_contribution`: everything but emission and fog, for the scene's global ambient light
-/// I_a and all lights.
+/// Returns `k_a I_a + Σ light_contribution` for the scene's global ambient light I_a and all lights: everything but
+/// emission and fog.
 pub fn shade(
     model: ReflectionModel,
     surface: impl Into<SurfaceSample>,
@@ -259,8 +263,7 @@ mod tests {
 
     #[test]
     fn the_three_parts_by_hand() {
-        // The viewer is 3-4-5 on the mirror side, so Phong's factor is 1; n·l = 0.8; both factors together
-        // are 1/4.
+        // The viewer is 3-4-5 on the mirror side, so Phong's factor is 1; n·l = 0.8; attenuation times spot is 1/4.
         let lit = light_contribution(
             ReflectionModel::Phong,
             &surface(),
@@ -273,7 +276,7 @@ mod tests {
             diffuse: DVec3::new(0.8, 0.2, 0.05),
             specular: DVec3::new(0.125, 0.0625, 0.03125),
         };
-        // Coefficients are dyadic; .6 and .8 are rounded to 2⁻⁵³.
+        // The coefficients are exact binary fractions; .6 and .8 are rounded to 2⁻⁵³.
         assert!((lit.total() - expected.total()).abs().max_element() < 1e-15, "{lit:?}");
         assert_eq!(lit.ambient, expected.ambient);
         assert!((lit.diffuse - expected.diffuse).abs().max_element() < 1e-16 * 8.0);
@@ -292,7 +295,7 @@ mod tests {
 
     #[test]
     fn the_specular_part_is_not_multiplied_by_the_cosine() {
-        // Document [M]'s vertex program weakens it by n·l; the equation does not.
+        // Document [M]'s vertex program multiplies it by n·l; the equation does not.
         let light =
             LightSample { direction: DVec3::new(0.8, 0.6, 0.0), attenuation: 1.0, spot: 1.0, ..sample() };
         let lit = light_contribution(
@@ -318,7 +321,7 @@ mod tests {
             (ReflectionModel::BlinnMatched, half.powi(16)),
         ];
         for (model, value) in expected {
-            // Rounding 2⁻⁵³ a few times, times the exponent.
+            // A few times 2⁻⁵³, times the exponent.
             assert!((factor(model) - value).abs() < 1e-14, "{model:?}");
         }
         assert_eq!(

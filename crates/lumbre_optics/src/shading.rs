@@ -1,4 +1,5 @@
-//! Which model is evaluated, and how often: the choices, not the equations.
+//! Which reflection model is evaluated and how often. These are the choices; the equations are in their own
+//! modules.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,25 +8,27 @@ use bevy_ecs::component::Component;
 
 use crate::ErrorBound;
 
-/// How often the lighting equation is evaluated on an object. As a component it overrides the scene's choice.
+/// How often the lighting equation is evaluated on an object. As a component, it overrides the scene's choice.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Shading {
     /// Once per polygon, at its centroid with the face's normal.
     Flat,
-    /// At the vertices; colours are interpolated.
+    /// At the vertices, with the colours interpolated.
     Gouraud,
-    /// At every fragment; normals are interpolated.
+    /// At every fragment, with the normals interpolated.
     #[default]
     Phong,
-    /// As rarely as an error allows: each object in view takes the cheapest of the other three of which it is known beforehand that no pixel is farther from Phong
-    /// shading than this. No shader does this: it is one of the others by the time that anything is drawn.
+    /// As rarely as an error bound allows: each object in view gets the cheapest of the other three for which an
+    /// estimate made in advance keeps every pixel within this error of Phong shading. No shader implements this
+    /// variant; it is resolved to one of the others before anything is drawn.
     Auto {
-        /// The largest difference of a pixel and channel, in exposed linear radiance between 0 and 1, the display's white.
+        /// The largest difference of any pixel and channel, in exposed linear radiance between 0 and 1, the
+        /// display's white.
         max_error: ErrorBound,
     },
 }
 
-/// Where flat shading evaluates a polygon.
+/// Where flat shading evaluates the lighting of a polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum FlatRule {
     /// At its centroid with the face's normal: document \[M\].
@@ -37,13 +40,13 @@ pub enum FlatRule {
     LastVertex,
 }
 
-/// The specular model. As a component it overrides the scene's choice for one object.
+/// The specular reflection model. As a component, it overrides the scene's choice for one object.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum ReflectionModel {
     /// (r·v)^n, Phong 1975.
     #[default]
     Phong,
-    /// (n·h)^n, the exponent as it stands (OpenGL).
+    /// (n·h)^n, with the exponent used unchanged (OpenGL).
     Blinn,
     /// (n·h)^(4n), equal to Phong's highlight in the plane of incidence.
     Blinn4n,
@@ -56,7 +59,7 @@ pub enum ReflectionModel {
 macro_rules! names {
     ($type:ident, $($variant:ident => $name:literal),+ $(; $other:ident { .. } => $other_name:literal)?) => {
         impl $type {
-            /// Every choice that needs no number, in the order of the documentation.
+            /// Every variant without parameters, in the order of the documentation.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
             /// The name used in files and on the command line.
@@ -64,7 +67,7 @@ macro_rules! names {
                 match self { $(Self::$variant => $name,)+ $(Self::$other { .. } => $other_name)? }
             }
 
-            /// The choice with that name, if there is one that needs no number beside it.
+            /// Returns the variant with that name, or `None`. Variants with parameters are not found.
             pub fn from_name(name: &str) -> Option<Self> {
                 match name { $($name => Some(Self::$variant),)+ _ => None }
             }
@@ -78,7 +81,7 @@ names!(ReflectionModel, Phong => "phong", Blinn => "blinn", Blinn4n => "blinn-4n
     BlinnMatched => "blinn-matched", TorranceSparrow => "torrance-sparrow");
 
 impl fmt::Display for Shading {
-    /// As files and the command line have it: `phong`, `auto:0.01`.
+    /// Formats it as in files and on the command line: `phong`, `auto:0.01`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Auto { max_error } => write!(f, "{}:{}", self.name(), max_error.get()),
@@ -87,7 +90,7 @@ impl fmt::Display for Shading {
     }
 }
 
-/// What is no shading.
+/// The text does not name a shading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("use one of flat, gouraud, phong, or auto:ERROR with an error above 0 and at most 1, like auto:0.01")]
 pub struct NoShading;
@@ -105,7 +108,7 @@ impl FromStr for Shading {
 }
 
 impl ReflectionModel {
-    /// The feature that `shaders/optics/shade.wesl` compiles this model under.
+    /// The feature under which `shaders/optics/shade.wesl` compiles this model.
     pub fn shader_feature(self) -> &'static str {
         match self {
             Self::Phong => "REFLECTION_PHONG",

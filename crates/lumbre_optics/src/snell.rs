@@ -1,69 +1,70 @@
-//! Refraction: where transmitted light goes, and when none is. Not how much: that is `fresnel`.
+//! Refraction: the direction of transmitted light, and when there is none. How much light is transmitted is in
+//! `fresnel`.
 //!
-//! eta is always η_t/η_i, the index behind the surface over the index in front. Document \[I\]'s derivation
-//! mixes eta and 1/eta; here sin θ_t = sin θ_i / eta, and no light is transmitted where sin θ_i > eta.
+//! eta is always η_t/η_i, the index behind the surface over the index in front. Document \[I\]'s derivation mixes
+//! eta and 1/eta; here sin θ_t = sin θ_i / eta, and no light is transmitted where sin θ_i > eta.
 
 use glam::DVec3;
 
 use crate::normalization::safe_normalize;
 use crate::power::cosine_lobe;
 
-/// Smallest and largest eta that are used; no pair of real media comes near them, and below the smallest the
-/// direction would drown in the rounding of η² - sin².
+/// eta is clamped to this range. No pair of real media comes near its ends, and below the smallest the direction
+/// would be lost in the rounding of η² - sin².
 const SMALLEST_INDEX: f64 = 1e-2_f32 as f64;
 const LARGEST_INDEX: f64 = 1e4;
 
-/// Whether all light is reflected: sin θ_i > eta. At the critical angle itself it still leaves, along the
-/// surface.
+/// Returns true under total internal reflection: sin θ_i > eta. At the critical angle itself light still leaves,
+/// along the surface.
 ///
 /// # Error of the f32 twin
 ///
-/// None: it compares what it is given. The sine of a direction is off by u and more, so callers decide by the
-/// cosine.
+/// None: it compares its arguments. The sine of a direction is off by u or more, so callers decide by the cosine.
 pub fn is_totally_reflected(sin_incident: f64, eta: f64) -> bool {
     sin_incident > eta.max(SMALLEST_INDEX)
 }
 
-/// The critical angle in radians, where sin θ_i = eta; none towards a denser medium (eta ≥ 1), or for eta
-/// that is not positive.
+/// Returns the critical angle in radians, where sin θ_i = eta; `None` towards a denser medium (eta ≥ 1) or if eta
+/// is not positive.
 pub fn critical_angle(eta: f64) -> Option<f64> {
     (eta > 0.0 && eta < 1.0).then(|| eta.asin())
 }
 
-/// cos θ_t = sqrt(1 - (sin θ_i / eta)²), and 0 under total internal reflection.
+/// Returns cos θ_t = sqrt(1 - (sin θ_i / eta)²), and 0 under total internal reflection.
 ///
-/// The difference of squares is taken as a product, which keeps its digits near the critical angle.
+/// The difference of squares is computed as a product, which keeps its digits near the critical angle.
 ///
 /// # Error of the f32 twin
 ///
-/// The root of what is off by u (14 s² + 3 |1 - s²|), s = sin/eta (a division, 7 u), and 9 u: so 9 u far from
-/// the critical angle, 7.5 u/cos near it, and 10⁻³ at it.
+/// The root of a value that is off by u (14 s² + 3 |1 - s²|) with s = sin/eta (a division, 7 u), plus 9 u: 9 u far
+/// from the critical angle, 7.5 u/cos near it, and 10⁻³ at it.
 pub fn transmitted_cosine(sin_incident: f64, eta: f64) -> f64 {
     let sine = sin_incident.max(0.0) / eta.max(SMALLEST_INDEX);
     ((1.0 - sine) * (1.0 + sine)).max(0.0).sqrt()
 }
 
-/// [`transmitted_cosine`], or nothing under total internal reflection, for a sine outside [0, 1], or for an eta that is outside
-/// [0.01, 10⁴], within which [`transmitted_cosine`] keeps it.
+/// Returns [`transmitted_cosine`], or `None` under total internal reflection, for a sine outside [0, 1], or for an
+/// eta outside [0.01, 10⁴].
 pub fn try_transmitted_cosine(sin_incident: f64, eta: f64) -> Option<f64> {
     let usable = (0.0..=1.0).contains(&sin_incident) && (SMALLEST_INDEX..=LARGEST_INDEX).contains(&eta);
     (usable && !is_totally_reflected(sin_incident, eta)).then(|| transmitted_cosine(sin_incident, eta))
 }
 
-/// t = -(1/eta) l - (cos θ_t - cos θ_i / eta) n: the unit direction, away from the light, in which light from
-/// l (unit, on the side of the unit normal n) goes on behind the surface. The zero vector under total
-/// internal reflection.
+/// Returns t = -(1/eta) l - (cos θ_t - cos θ_i / eta) n: the unit direction, pointing away from the light, in which
+/// light from l (a unit vector on the side of the unit normal n) continues behind the surface. It is the zero
+/// vector under total internal reflection.
 ///
-/// eta cos θ_t is taken from the cosine, as in [`fresnel_dielectric`](crate::fresnel_dielectric), not from
-/// the sine, whose rounding is multiplied by 1/cos θ_t where light grazes. The factor 1/eta is left to the
-/// normalization.
+/// eta cos θ_t is computed from the cosine, as in [`fresnel_dielectric`](crate::fresnel_dielectric). The rounding
+/// of the sine would be multiplied by 1/cos θ_t at grazing angles. The normalization supplies the factor 1/eta.
 ///
 /// # Error of the f32 twin
 ///
-/// With g = eta cos θ_t: g² is off by u (3 |η² - 1| + cos² + g²) and 6 u |cos| Σ|n l|, g by the root of that
-/// and 9 u, cos θ_i - g by both and u; the sum by that and two roundings, made unit over its length eta,
-/// doubled for what normalization turns, and 7 u. For eta from 1/3 to 3 away from the critical angle some 40 u; near it as [`transmitted_cosine`]; for the smallest index .006. For eta ≥ 1 nothing cancels. Where g²
-/// is within its error of 0 either the direction along the surface or none.
+/// With g = eta cos θ_t: g² is off by u (3 |η² - 1| + cos² + g²) and 6 u |cos| Σ|n l|, g by the root of that and 9
+/// u, cos θ_i - g by both and u. The sum is off by that and two roundings; normalizing divides it by its length
+/// eta, doubles it for the change of direction, and adds 7 u. For eta from 1/3 to 3 away from the critical angle
+/// that is some 40 u; near it it grows as in [`transmitted_cosine`]; for the smallest index it is .006. For eta ≥ 1
+/// nothing cancels. Where g² is within its error of 0 the result may be either the direction along the surface or
+/// the zero vector.
 pub fn transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> DVec3 {
     let index = eta.clamp(SMALLEST_INDEX, LARGEST_INDEX);
     let cos_incident = normal.dot(light);
@@ -74,7 +75,7 @@ pub fn transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> DVec3 {
     safe_normalize((cos_incident - g_squared.sqrt()) * normal - light)
 }
 
-/// [`transmitted_direction`], or nothing under total internal reflection, with the light behind the surface,
+/// Returns [`transmitted_direction`], or `None` under total internal reflection, with the light behind the surface,
 /// or for an eta that is not positive and finite.
 pub fn try_transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> Option<DVec3> {
     let usable = eta.is_finite() && eta > 0.0 && normal.dot(light) > 0.0;
@@ -82,13 +83,13 @@ pub fn try_transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> Optio
     (direction != DVec3::ZERO).then_some(direction)
 }
 
-/// (t·v)ⁿ of document \[I\]: the highlight of light that shines through, for a viewer behind the surface (n·v
-/// < 0) with the light in front (n·l > 0), else 0.
+/// Returns (t·v)ⁿ of document \[I\]: the highlight of light that shines through, for a viewer behind the surface
+/// (n·v < 0) and a light in front of it (n·l > 0); else 0.
 ///
 /// # Error of the f32 twin
 ///
-/// That of [`cosine_lobe`] around a [`transmitted_direction`]; either side of n·l > 0, n·v < 0 and total
-/// reflection where they are within rounding.
+/// That of [`cosine_lobe`] around a [`transmitted_direction`]. Within rounding of n·l = 0, n·v = 0 and total
+/// reflection, the result may be that of either side.
 pub fn transmitted_highlight(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, eta: f64) -> f64 {
     let direction = transmitted_direction(normal, light, eta);
     if normal.dot(light) <= 0.0 || normal.dot(viewer) >= 0.0 || direction.length_squared() < 0.5 {
@@ -113,7 +114,7 @@ mod tests {
                 let transmitted = (incident.sin() / eta).asin();
                 let expected = -at(transmitted);
                 let got = transmitted_direction(DVec3::Y, at(incident), eta);
-                // At 44 degrees into 0.7 the cosine is .12: its rounding is 2⁻⁵³/.12² at most.
+                // At 44 degrees into 0.7 the cosine is .12, so its rounding is at most 2⁻⁵³/.12².
                 assert!((got - expected).length() < 1e-14, "{eta} at {degrees}: {got} {expected}");
                 assert!((transmitted_cosine(incident.sin(), eta) - transmitted.cos()).abs() < 1e-14);
             }
@@ -133,7 +134,7 @@ mod tests {
         assert_eq!(critical_angle(1.0), None);
         assert_eq!(critical_angle(1.5), None);
         assert_eq!(critical_angle(f64::NAN), None);
-        // At the angle: along the surface. A hair beyond: nothing.
+        // At the critical angle the direction is along the surface; slightly beyond there is none.
         assert!(!is_totally_reflected(eta, eta));
         assert_eq!(transmitted_cosine(eta, eta), 0.0);
         assert_eq!(transmitted_direction(DVec3::Y, at(critical + 1e-12), eta), DVec3::ZERO);

@@ -1,60 +1,63 @@
-//! Highlights that do not sparkle: the lobe of a pixel whose normals vary. Not multisampling, which sees edges only, and not a
-//! filter for normal maps.
+//! Specular antialiasing: highlights that do not sparkle, from the lobe of a pixel whose normals vary.
+//! Multisampling does not help here, as it only samples edges. This is not a filter for normal maps.
 //!
-//! A pixel of a curved or distant surface holds many normals, and the one at its centre makes a highlight that is narrower and
-//! brighter than the pixel's mean: it flickers as things move. Seen through a pixel filter of standard deviation σ the normals
-//! have the variance σ² (|∂N/∂x|² + |∂N/∂y|²) / 2 along each axis, and a lobe of width α convolved with them has
-//! α'² = α² + σ² (|∂N/∂x|² + |∂N/∂y|²) (Kaplanyan, Hill, Patney and Lefohn 2016, section 4; Tokuyoshi and Kaplanyan 2019, section
-//! 5), where α² = 2/(m + 2) for the exponent m of n·h. The widening is clamped to [`LARGEST_WIDENING`], because a derivative
-//! across a crease says nothing of the pixel.
+//! A pixel of a curved or distant surface contains many normals. The highlight of the one at its centre is narrower
+//! and brighter than the pixel's mean, and flickers as things move. Under a pixel filter of standard deviation σ
+//! the normals have the variance σ² (|∂N/∂x|² + |∂N/∂y|²) / 2 along each axis, and a lobe of width α convolved with
+//! them has α'² = α² + σ² (|∂N/∂x|² + |∂N/∂y|²) (Kaplanyan, Hill, Patney and Lefohn 2016, section 4; Tokuyoshi and
+//! Kaplanyan 2019, section 5), where α² = 2/(m + 2) for the exponent m of n·h. The widening is clamped to
+//! [`LARGEST_WIDENING`], because a derivative across a crease says nothing about the pixel.
 //!
-//! The specular factors of this crate are 1 at their peak, so that a wider lobe would gain energy: the peak falls by α²/α'².
+//! The specular factors of this crate are 1 at their peak, so that a wider lobe would gain energy: the peak is
+//! therefore multiplied by α²/α'².
 //!
-//! Phong shading only: flat and Gouraud shading evaluate no highlight in a pixel. Off unless a scene asks for it: it makes
-//! pictures differ from the bare equation on purpose.
+//! This is for Phong shading only, as flat and Gouraud shading evaluate no highlight per pixel. It is off unless a
+//! scene asks for it, because it deliberately deviates from the plain equation.
 //!
-//! Error: the sum of the two derivatives stands for both axes, which is exact where the surface bends alike in both directions
-//! and too wide across a cylinder by up to a factor of √2 in α; the convolution is exact for Gaussian lobes, which cos^m is to
-//! O(1/m).
+//! Error: the sum of the two derivatives stands for both axes, which is exact where the surface bends equally in
+//! both directions and too wide across a cylinder by up to a factor of √2 in α. The convolution is exact for
+//! Gaussian lobes, which cos^m is to O(1/m).
 
-/// Variance of the pixel filter, in pixels squared: σ = ½.
+/// Variance of the pixel filter in square pixels: σ = ½.
 pub const FILTER_VARIANCE: f64 = 0.25;
 
-/// The largest widening of α².
+/// The largest amount by which α² is widened.
 pub const LARGEST_WIDENING: f64 = 0.18;
 
-/// A lobe as a pixel shows it.
+/// A lobe after filtering over a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilteredLobe {
-    /// Exponent instead of the material's; at most that.
+    /// The exponent that replaces the material's, and is never larger.
     pub shininess: f64,
-    /// What the highlight is multiplied by, in (0, 1].
+    /// Factor on the highlight, in (0, 1].
     pub peak: f64,
 }
 
-/// By how much α² widens where unit normals change by vectors of these squared lengths from pixel to pixel. In [0, 0.18].
+/// Returns by how much α² widens where the unit normal changes by vectors of these squared lengths between
+/// neighbouring pixels in x and y. In [0, 0.18].
 ///
 /// # Error of the f32 twin
 ///
-/// 2 u: a sum and a product with a power of two, or the rounded clamp.
+/// 2 u: a sum and a product with a power of two, or the rounded constant of the clamp.
 pub fn lobe_widening(squared_change_x: f64, squared_change_y: f64) -> f64 {
     (FILTER_VARIANCE * (squared_change_x + squared_change_y)).clamp(0.0, LARGEST_WIDENING)
 }
 
-/// The exponent and peak of a lobe widened by `widening` (of α², at least 0).
+/// Returns the exponent and peak of a lobe whose α² is widened by `widening` (at least 0).
 ///
-/// `half_vector_scale` is how many times faster the exponent falls in terms of n·h: 4 for exponents of r·v (Phong's and its two
-/// fits, since r turns twice as far as n), 1 for exponents of n·h. Exponents are at least 0; the widest lobe has exponent 0.
+/// `half_vector_scale` is the ratio of the equivalent exponent of n·h to `shininess`: 4 for exponents of r·v
+/// (Phong's and its two fits, since r turns twice as far as n), 1 for exponents of n·h. Exponents are at least 0;
+/// the widest lobe has exponent 0.
 ///
 /// # Error of the f32 twin
 ///
-/// Exponent: 15 u of itself and 16 u / `half_vector_scale` absolute. α² is off by 7 u (sum, division), α'² by
-/// 8 u, which its difference from 1 makes absolute; then a product and a division. Peak: 20 u, the two α² and
-/// a division.
+/// Exponent: 15 u of itself and 16 u / `half_vector_scale` absolute. α² is off by 7 u (a sum and a division) and
+/// α'² by 8 u, which becomes absolute in the difference from 1; then a product and a division follow. Peak: 20 u,
+/// from the two α² and a division.
 pub fn filtered_lobe(shininess: f64, half_vector_scale: f64, widening: f64) -> FilteredLobe {
     let alpha_squared = 2.0 / (half_vector_scale * shininess.max(0.0) + 2.0);
     let widened = (alpha_squared + widening.max(0.0)).min(1.0);
-    // 2/α'² - 2 as 2 (1 - α'²)/α'²: exact at α' = 1.
+    // 2/α'² - 2, written as 2 (1 - α'²)/α'² so that it is exact at α' = 1.
     FilteredLobe {
         shininess: 2.0 * (1.0 - widened) / (widened * half_vector_scale),
         peak: alpha_squared / widened,
@@ -70,7 +73,7 @@ mod tests {
         for shininess in [0.0, 1.0, 128.0, 1e6] {
             for scale in [1.0, 4.0] {
                 let lobe = filtered_lobe(shininess, scale, lobe_widening(0.0, 0.0));
-                // Two divisions and a difference from 1, multiplied by the exponent at small α.
+                // Two divisions and a difference from 1, amplified by the exponent at small α.
                 assert!((lobe.shininess - shininess).abs() <= 1e-15 * (1.0 + scale * shininess * shininess));
                 assert_eq!(lobe.peak, 1.0);
             }
@@ -92,8 +95,8 @@ mod tests {
 
     #[test]
     fn the_energy_of_the_lobe_stays() {
-        // The lobe cos^m has the solid angle 2π/(m + 1) and weighted by the cosine 2π/(m + 2), which is π α²: peak times
-        // the new one is the old one.
+        // The lobe cos^m has the solid angle 2π/(m + 1), and weighted by the cosine 2π/(m + 2), which is π α². The
+        // old one equals the new one times the peak.
         for shininess in [10.0, 1e3, 1e5] {
             let lobe = filtered_lobe(shininess, 1.0, 0.01);
             let (before, after) = (1.0 / (shininess + 2.0), lobe.peak / (lobe.shininess + 2.0));
@@ -103,10 +106,10 @@ mod tests {
 
     #[test]
     fn it_is_the_mean_over_normals_of_a_gaussian_pixel() {
-        // (n·h)^m at angle a, averaged over normals that are spread with variance s² along each axis: against a sum over a
-        // grid. The closed form is exact for Gaussians; cos^m differs from one by O(1/m).
+        // (n·h)^m at the angle a, averaged over normals with variance s² along each axis, is compared with a sum
+        // over a grid. The closed form is exact for Gaussians; cos^m differs from one by O(1/m).
         let (exponent, spread) = (400.0, 0.05f64);
-        // α² widens by twice the variance of an axis.
+        // α² widens by twice the variance along one axis.
         let lobe = filtered_lobe(exponent, 1.0, 2.0 * spread * spread);
         for angle in [0.0f64, 0.03, 0.06, 0.1] {
             let (mut sum, mut weight) = (0.0, 0.0);

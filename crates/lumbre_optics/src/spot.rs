@@ -1,4 +1,4 @@
-//! Spot cones: how a light narrows around its axis. Not the distance: that is `attenuation`.
+//! Spot cones: how a light narrows around its axis. The attenuation with distance is in `attenuation`.
 
 use glam::{DVec3, DVec4};
 
@@ -15,8 +15,8 @@ pub enum SpotCone {
         /// Concentration exponent, at least 0.
         exponent: f32,
     },
-    /// KHR_lights_punctual's spot: full inside `inner`, nothing outside `outer`, and between them the square
-    /// of a linear function of the angle's cosine.
+    /// KHR_lights_punctual's spot: full inside `inner`, nothing outside `outer`, and in between the square of a
+    /// function that is linear in the cosine of the angle.
     Smooth {
         /// Half angle in radians where the fall-off begins, 0 to `outer`.
         inner: f32,
@@ -25,23 +25,22 @@ pub enum SpotCone {
     },
 }
 
-/// A cone as cosines, taken once on the CPU: WGSL's cos is only good to 2⁻¹¹.
+/// A cone as cosines, computed once on the CPU because WGSL's cos is only good to 2⁻¹¹.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotCosines {
-    /// Whether it is the smooth cone of KHR_lights_punctual rather than OpenGL's.
+    /// Whether this is the smooth cone of KHR_lights_punctual rather than OpenGL's.
     pub smooth_cone: bool,
-    /// Cosine of the half angle at which the light ends, at least 0; -2 for a cutoff of π, which ends
-    /// nowhere.
+    /// Cosine of the half angle at which the light ends, at least 0; -2 for a cutoff of π, where the light does not
+    /// end at all.
     pub outer: f64,
-    /// Cosine of the inner half angle of a smooth cone, OpenGL's exponent of the other.
+    /// Cosine of the inner half angle of a smooth cone, or the exponent of OpenGL's.
     pub inner_or_exponent: f64,
 }
 
-/// Least difference between the two cosines of a smooth cone (KHR_lights_punctual's own example code).
+/// Minimum difference between the two cosines of a smooth cone, as in KHR_lights_punctual's example code.
 pub const MINIMUM_COSINE_DIFFERENCE: f64 = 0.001;
 
-/// How far from π a cutoff may be and still mean 180 degrees: the rounding of π, and of degrees times π/180,
-/// in f32.
+/// How far from π a cutoff may be and still mean 180 degrees: the rounding in f32 of π, and of degrees times π/180.
 const CUTOFF_ROUNDING: f64 = 1e-6;
 
 impl SpotCone {
@@ -53,16 +52,16 @@ impl SpotCone {
         }
     }
 
-    /// Whether it is OpenGL's cutoff of 180 degrees, which makes a spotlight a point light.
+    /// Returns true for OpenGL's cutoff of 180 degrees, which makes a spotlight a point light.
     pub fn is_everywhere(&self) -> bool {
         matches!(*self, Self::Exponent { cutoff, .. }
             if (f64::from(cutoff) - std::f64::consts::PI).abs() <= CUTOFF_ROUNDING)
     }
 
-    /// The cone as [`spot_factor`] takes it. A cutoff of 90 degrees is cosine 0 exactly, though f32's π/2
-    /// lies beyond it.
+    /// The cone as [`spot_factor`] takes it. The cosine of a cutoff of 90 degrees is exactly 0, although f32's π/2
+    /// is slightly more than π/2.
     pub fn cosines(&self) -> SpotCosines {
-        // No cone opens backwards, so the rounding of π/2 must not let it.
+        // No cone opens backwards: the clamp undoes the rounding of π/2.
         let cosine = |angle: f32| f64::from(angle).cos().max(0.0);
         match *self {
             Self::Exponent { .. } if self.is_everywhere() => {
@@ -80,19 +79,19 @@ impl SpotCone {
     }
 }
 
-/// The factor of a spotlight in [0, 1], for the cosine between its axis and the direction from the light to
-/// the point.
+/// Returns the factor of a spotlight, in [0, 1], for the cosine between its axis and the direction from the light
+/// to the point.
 ///
-/// OpenGL's cone (`smooth_cone` false): `cosine^exponent` where `outer < cosine`, strictly as in Mesa, so a
-/// cutoff of 0 lights nothing and a cutoff of 90 degrees excludes the plane of the light. The smooth cone:
-/// the square of `clamp((cosine - outer)/max(inner - outer, 0.001), 0, 1)`.
+/// OpenGL's cone (`smooth_cone` false) is `cosine^exponent` where `outer < cosine`. As in Mesa the comparison is
+/// strict, so a cutoff of 0 lights nothing and a cutoff of 90 degrees excludes the plane through the light. The
+/// smooth cone is the square of `clamp((cosine - outer)/max(inner - outer, 0.001), 0, 1)`.
 ///
 /// # Error of the f32 twin
 ///
-/// Smooth cone: 15 u of the factor; difference, width and division 7 u, squared. Exponent: that of
-/// [`safe_pow`], and none outside. The cosines are given, so the edge is exact. A cosine that is off by e
-/// itself, as in [`evaluate_light`](crate::evaluate_light), adds 2 e over the width (of .001 at least), or
-/// moves base and edge by e: within e of the edge either side's value is right.
+/// Smooth cone: 15 u of the factor; difference, width and division are 7 u, then squared. Exponent: that of
+/// [`safe_pow`] inside, none outside. The edge is exact, as the cosines are given. If the cosine itself is off by
+/// e, as in [`evaluate_light`](crate::evaluate_light), that adds 2 e over the width (of at least .001), or moves
+/// base and edge by e: within e of the edge the value of either side is right.
 pub fn spot_factor(smooth_cone: bool, outer: f64, inner_or_exponent: f64, cosine: f64) -> f64 {
     let cosine = cosine.clamp(-1.0, 1.0);
     if smooth_cone {
@@ -103,21 +102,22 @@ pub fn spot_factor(smooth_cone: bool, outer: f64, inner_or_exponent: f64, cosine
     if outer < cosine { safe_pow(cosine, inner_or_exponent) } else { 0.0 }
 }
 
-/// [`spot_factor`] of a smooth cone, from [`SpotCosines::smooth_cone_about`] its axis and the unit direction from the point to the light: what a loop over
-/// many lights has at hand.
+/// Returns the [`spot_factor`] of a smooth cone, from [`SpotCosines::smooth_cone_about`] its axis and the unit
+/// direction from the point to the light, which is what a loop over many lights has at hand.
 ///
 /// # Error of the f32 twin
 ///
-/// Of the linear function 6 u times the sum of its terms' sizes, which is at most 2/width + 1 for a width of .001 or more; its square, twice that times the function,
-/// and 1 u.
+/// The linear function is off by 6 u times the sum of its terms' magnitudes, which is at most 2/width + 1 for a
+/// width of .001 or more; its square by twice that times the function, and by 1 u.
 pub fn smooth_spot_factor(cone: DVec4, to_light: DVec3) -> f64 {
     let angular = (cone.w - cone.truncate().dot(to_light)).clamp(0.0, 1.0);
     angular * angular
 }
 
 impl SpotCosines {
-    /// A smooth cone about a unit axis, along which it shines, as [`smooth_spot_factor`] takes it: the axis divided by the width between the two cosines, and what
-    /// the linear function is at a right angle. Nothing of OpenGL's cone.
+    /// Returns a smooth cone about the unit axis along which it shines, as [`smooth_spot_factor`] takes it: the
+    /// axis divided by the width between the two cosines, and the value of the linear function at a right angle to
+    /// the axis. `None` for OpenGL's cone.
     pub fn smooth_cone_about(&self, axis: DVec3) -> Option<DVec4> {
         let scale = (self.inner_or_exponent - self.outer).max(MINIMUM_COSINE_DIFFERENCE).recip();
         self.smooth_cone.then(|| (axis * scale).extend(-self.outer * scale))
@@ -125,11 +125,12 @@ impl SpotCosines {
 }
 
 impl SpotCone {
-    /// The factor in the direction `from_light` of a light that shines along `axis`, both of any length; or nothing where there is none:
-    /// an axis or a direction of length 0, angles that are not from 0 to π/2 (or π, as a cutoff), an inner angle beyond the outer one,
-    /// an exponent that is negative or not finite. [`spot_factor`] takes the cosine, which is then 0: no light.
+    /// Returns the factor, in the direction `from_light`, of a light that shines along `axis` (both of any length),
+    /// or `None` where it is undefined: an axis or direction of length 0, angles outside [0, π/2] (a cutoff of π is
+    /// allowed), an inner angle beyond the outer one, or an exponent that is negative or not finite. Without a
+    /// direction, [`evaluate_light`](crate::evaluate_light) passes a cosine of 0 to [`spot_factor`].
     pub fn try_factor(&self, axis: DVec3, from_light: DVec3) -> Option<f64> {
-        // f32's π/2 is a little more than it.
+        // f32's π/2 is slightly more than π/2.
         let right_angle = 0.0..=std::f32::consts::FRAC_PI_2;
         let usable = match *self {
             Self::Exponent { cutoff, exponent } => {
@@ -224,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_light_without_a_direction_is_off() {
-        // The cosine with a zero axis is 0.
+        // With an axis of length 0 the cosine is 0.
         assert_eq!(factor(SpotCone::Exponent { cutoff: 1.0, exponent: 0.0 }, 0.0), 0.0);
         assert_eq!(factor(SpotCone::Smooth { inner: 0.1, outer: 1.0 }, 0.0), 0.0);
         let cone = SpotCone::Smooth { inner: 0.1, outer: 1.0 };

@@ -1,25 +1,26 @@
-//! Which normal a face is lit with. Not which material: `Material::surface` chooses that by the same flag.
+//! Which normal a face is lit with. The material of that side is chosen by `Material::surface`, with the same flag.
 
 use glam::DVec3;
 
 use crate::normalization::try_normalize;
 
-/// The normal, reversed on the back of a face: two-sided lighting of OpenGL 2.1 §2.14.1, where the front is
+/// Returns the normal, reversed on the back of a face: two-sided lighting of OpenGL 2.1 §2.14.1, where the front is
 /// the side whose corners wind counter-clockwise on the screen.
 ///
 /// # Error of the f32 twin
 ///
-/// None: a sign.
+/// None: only the sign changes.
 pub fn facing_normal(normal: DVec3, front_facing: bool) -> DVec3 {
     if front_facing { normal } else { -normal }
 }
 
-/// A unit normal from an interpolated one, or the face's own unit normal where interpolation cancelled it.
+/// Returns the unit vector of an interpolated normal, or the face's own unit normal where interpolation cancelled
+/// it to zero.
 ///
 /// # Error of the f32 twin
 ///
-/// That of [`safe_normalize`](crate::safe_normalize). For interpolated normals shorter than 7·10⁻¹⁶ the
-/// face's own; within 20 u of that length either.
+/// That of [`safe_normalize`](crate::safe_normalize). The face's own normal replaces interpolated normals shorter
+/// than 7·10⁻¹⁶; within 20 u of that length either may be returned.
 pub fn shading_normal(interpolated: DVec3, face_normal: DVec3) -> DVec3 {
     try_normalize(interpolated).unwrap_or(face_normal)
 }

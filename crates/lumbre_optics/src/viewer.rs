@@ -1,23 +1,23 @@
-//! Where the viewer is, as seen from the surface: local, or infinitely distant as OpenGL assumes by default.
+//! The direction to the viewer, who is local or, as OpenGL assumes by default, infinitely distant.
 
 use glam::DVec3;
 
 use crate::normalization::{safe_normalize, try_normalize};
 
-/// v: the unit direction to the viewer.
+/// Returns v, the unit direction to the viewer.
 ///
-/// A local viewer stands at `eye`; an infinitely distant one is seen along `backward`, the camera's own +Z
-/// axis (unit, from the scene to the camera), from everywhere. Zero where the point is the eye itself.
+/// A local viewer is at `eye`. For an infinitely distant one the direction is `backward` everywhere: the camera's
+/// own +Z axis, a unit vector from the scene to the camera. The result is zero where the point is the eye itself.
 ///
 /// # Error of the f32 twin
 ///
-/// 9 u of each component for a local viewer, as of a half vector: the difference of two positions is rounded
-/// once per component. None for a distant one. How well the positions themselves are known is another matter.
+/// 9 u of each component for a local viewer, as for a half vector: the difference of two positions is rounded once
+/// per component. None for a distant viewer. Errors of the positions themselves are not included.
 pub fn viewer_direction(local_viewer: bool, eye: DVec3, backward: DVec3, point: DVec3) -> DVec3 {
     if local_viewer { safe_normalize(eye - point) } else { backward }
 }
 
-/// [`viewer_direction`], or nothing where the point is the eye, or the distant viewer has no direction.
+/// Returns [`viewer_direction`], or `None` where the point is the eye or `backward` is zero.
 pub fn try_viewer_direction(local_viewer: bool, eye: DVec3, backward: DVec3, point: DVec3) -> Option<DVec3> {
     try_normalize(if local_viewer { eye - point } else { backward })
 }

@@ -1,4 +1,4 @@
-//! What holds for all inputs: finite, monotone, linear, symmetric, reciprocal.
+//! Properties that hold for all inputs: finite, monotone, linear, symmetric, reciprocal.
 
 #[path = "properties/energy.rs"]
 mod energy;
@@ -8,7 +8,7 @@ use lumbre_optics::*;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// Every finite f64, the denormals and the largest included.
+/// Every finite f64, including denormals and the largest numbers.
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => -10.0..10.0f64,
@@ -33,7 +33,7 @@ fn color() -> impl Strategy<Value = Vec3> {
     [0.0..1.0f32, 0.0..1.0f32, 0.0..1.0f32].prop_map(Vec3::from)
 }
 
-/// Unit vectors, evenly over the sphere, and the zero vector.
+/// Unit vectors, uniform over the sphere, and the zero vector.
 fn unit() -> impl Strategy<Value = DVec3> {
     prop_oneof![
         20 => (-1.0..1.0f64, 0.0..std::f64::consts::TAU).prop_map(|(z, azimuth)| {
@@ -162,7 +162,7 @@ proptest! {
     ) {
         let attenuation = Attenuation { constant, linear, quadratic, ..Attenuation::NONE };
         let reach = attenuation.reach(threshold);
-        // A rounding or two in either formula.
+        // One or two roundings in either formula.
         prop_assert!(attenuation.factor(reach * (1.0 + 1e-12) + 1e-12) <= threshold * (1.0 + 1e-12));
     }
 
@@ -192,7 +192,7 @@ proptest! {
             .collect();
         let there = shade(model, &surface, DVec3::ONE, samples.iter().copied(), normal, viewer).total();
         let back = shade(model, &surface, DVec3::ONE, samples.iter().rev().copied(), normal, viewer).total();
-        // Eight additions of non-negative numbers, each rounded by 2⁻⁵³ of the sum.
+        // Eight additions of non-negative numbers, each rounded to 2⁻⁵³ of the sum.
         prop_assert!((there - back).abs().max_element() <= 2e-15 * (1.0 + there.max_element()));
     }
 
@@ -218,7 +218,7 @@ proptest! {
 
     #[test]
     fn what_is_reflected_and_transmitted_is_all(angle in 0.0..1.57f64, eta in 0.3..3.0f64) {
-        // In the direction reversed, the same part is reflected.
+        // Light in the opposite direction is reflected by the same fraction.
         let (sine, cosine) = angle.sin_cos();
         prop_assume!((sine / eta - 1.0).abs() > 1e-9);
         let there = fresnel_dielectric(cosine, eta);
@@ -226,7 +226,8 @@ proptest! {
             prop_assert_eq!(there, 1.0);
         } else {
             let back = fresnel_dielectric(transmitted_cosine(sine, eta), 1.0 / eta);
-            // The cosine beyond is a root: 2⁻⁵³ over its value, 4·10⁻⁵ at the assumption's bound.
+            // The transmitted cosine is a root: its error is 2⁻⁵³ over its value, which is 4·10⁻⁵ at the assumed
+            // bound.
             prop_assert!((there - back).abs() < 1e-10, "{} {}", there, back);
         }
     }
@@ -237,7 +238,7 @@ proptest! {
         prop_assume!(normal.dot(light) > 1e-3);
         if let Some(direction) = try_transmitted_direction(normal, light, eta) {
             let (before, after) = (normal.cross(light), normal.cross(direction));
-            // n × l = -eta n × t: the same plane and the law of sines in one.
+            // n × l = -eta n × t: the coplanarity and Snell's law in one equation.
             prop_assert!((before + eta * after).length() < 1e-14);
             prop_assert!(normal.dot(direction) <= 0.0 && (direction.length() - 1.0).abs() < 1e-15);
         } else {
@@ -268,7 +269,7 @@ proptest! {
         (a, b) in (color(), color()),
         part in 0..3usize,
     ) {
-        // L(a) + L(b) = L(a + b) in the ambient, the diffuse and the specular colour by itself.
+        // L(a) + L(b) = L(a + b), separately for the ambient, the diffuse and the specular colour.
         let lit = |color: Vec3| {
             let mut sample = LightSample { direction: light, attenuation: 0.5, spot: 0.75, ..LightSample::DARK };
             let parts = [&mut sample.ambient, &mut sample.diffuse, &mut sample.specular];
@@ -276,7 +277,7 @@ proptest! {
             light_contribution(model, &surface, &sample, DVec3::Z, viewer).total()
         };
         let (sum, whole) = (lit(a) + lit(b), lit(a + b));
-        // Colours are f32: their sum is rounded.
+        // Colours are f32, so their sum is rounded.
         prop_assert!((sum - whole).abs().max_element() <= 1e-6 * (1.0 + whole.max_element()), "{sum} {whole}");
     }
 
@@ -291,7 +292,8 @@ proptest! {
             Fresnel::Conductor { eta: Vec3::new(0.2, 0.9, 1.4), absorption: Vec3::new(3.0, 2.5, 2.0) },
         ]),
     ) {
-        // Times n.v it is symmetric: G and D are, and F knows h alone. Above the floor of the view cosine.
+        // Multiplied by n·v it is symmetric: G and D are, and F depends on h alone. The directions are above the
+        // minimum view cosine.
         let reflect = |l: DVec3, v: DVec3| {
             let kind = (distribution, fresnel);
             microfacet_reflection(kind, DVec3::Z, l, v, shininess, DVec3::new(0.9, 0.5, 0.04), 1.5) * v.z
@@ -306,7 +308,8 @@ proptest! {
         shininess in 1.0..200.0f64,
         distribution in prop::sample::select(Distribution::ALL.to_vec()),
     ) {
-        // The mirror direction of a mirror: k_s D G F/(n.v) with D = 1 is at most 1/(n.v), so times n.v at most 1.
+        // In the mirror direction of a mirror k_s D G F/(n·v) with D = 1 is at most 1/(n·v), so times n·v at most
+        // 1.
         let light = DVec3::new(incident.sin(), 0.0, incident.cos());
         let kind = (distribution, Fresnel::NormalReflectance);
         for azimuth in [0.0f64, 0.3, 3.0] {

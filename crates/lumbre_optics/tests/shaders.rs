@@ -1,5 +1,5 @@
-//! Every file of `shaders/optics` compiles under every feature it knows, passes naga's validator, holds
-//! nothing that its features did not call for, and takes its arguments in the order of its Rust twin.
+//! Checks that every file of `shaders/optics` compiles under every feature it knows and passes naga's validator,
+//! contains nothing that its features did not ask for, and takes its arguments in the order of its Rust twin.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ fn shaders() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shaders")
 }
 
-/// The names of the shader files, without their ending, in alphabetical order.
+/// The names of the shader files without their extension, in alphabetical order.
 fn stems() -> Vec<String> {
     let mut stems: Vec<String> = std::fs::read_dir(shaders().join("optics"))
         .expect("shaders/optics is part of the source")
@@ -26,7 +26,7 @@ fn stems() -> Vec<String> {
     stems
 }
 
-/// One file and all that it imports, as WGSL.
+/// Compiles one file and everything that it imports to WGSL.
 fn compile(stem: &str, features: &[&str]) -> String {
     kept(stem, features, Kept::RootModule)
 }
@@ -113,7 +113,7 @@ fn a_shade_variant_holds_no_other_models_functions() {
         for own in functions[feature] {
             assert!(source.contains(own), "{feature} lacks {own}");
         }
-        // The half vector is shared by Blinn's three; everything else belongs to one model only.
+        // The half vector is shared by Blinn's three models; everything else belongs to one model only.
         for foreign in
             ["reflected_direction", "blinn_phong_4n", "blinn_phong_matched", "fresnel", "geometric"]
         {
@@ -124,7 +124,7 @@ fn a_shade_variant_holds_no_other_models_functions() {
     }
 }
 
-/// A compiled shade with these features, and what is not reached from it stripped.
+/// `shade` compiled with these features, without what `light_contribution` does not reach.
 fn stripped_shade(features: &[&str]) -> String {
     kept("shade", features, Kept::Declarations(&["light_contribution"]))
 }
@@ -154,14 +154,14 @@ fn a_microfacet_variant_holds_its_own_choices_only() {
                 );
             }
             for (_, function) in fresnels {
-                // The reflectance at normal incidence is a dielectric's.
+                // The reflectance at normal incidence calls the dielectric's.
                 let called = fresnel == "FRESNEL_NORMAL_REFLECTANCE" && function == "fresnel_dielectric";
                 let own = function == own_fresnel || called;
                 assert_eq!(source.contains(function), own, "{features:?}: {function}");
             }
         }
     }
-    // A matt surface has no model at all.
+    // A matt surface contains no model at all.
     for model in reflection_features() {
         let matt = stripped_shade(&[model, "MICROFACETS", "MATT"]);
         validate(&format!("matt shade, {model}"), &matt);
@@ -169,14 +169,14 @@ fn a_microfacet_variant_holds_its_own_choices_only() {
             assert!(!matt.contains(foreign), "{model}: {foreign}\n{matt}");
         }
     }
-    // The default choices are the plain model.
+    // With the default choices the plain model is compiled.
     let plain = stripped_shade(&["REFLECTION_TORRANCE_SPARROW"]);
     for foreign in ["microfacet_lobe", "conductor", "absorption", "gaussian"] {
         assert!(!plain.contains(foreign), "{foreign}\n{plain}");
     }
 }
 
-/// What stands before the bracket that closes one opened before, without what inner brackets hold.
+/// Returns the text up to the bracket that closes the one opened before it, without the contents of inner brackets.
 fn up_to_its_bracket(text: &str) -> Option<String> {
     let mut depth = 0;
     let mut outer = String::new();
@@ -195,7 +195,7 @@ fn up_to_its_bracket(text: &str) -> Option<String> {
 /// The functions of a source file and the names of their arguments.
 fn signatures(source: &str) -> BTreeMap<String, Vec<String>> {
     let mut found = BTreeMap::new();
-    // Tests come last in every file and have no twin.
+    // Tests come last in every file and have no twins.
     let source = source.split("#[cfg(test)]").next().unwrap_or_default();
     for piece in source.split("fn ").skip(1) {
         let Some((name, rest)) = piece.split_once('(') else { continue };
@@ -214,7 +214,7 @@ fn signatures(source: &str) -> BTreeMap<String, Vec<String>> {
 
 #[test]
 fn twins_have_the_same_names_and_arguments() {
-    // Where Rust takes the choice as an argument, WESL takes it as a feature or a struct.
+    // Choices that Rust takes as arguments and WESL as features or in a struct.
     let choices = [
         "model",
         "mode",
@@ -227,7 +227,7 @@ fn twins_have_the_same_names_and_arguments() {
         "eta",
         "absorption",
     ];
-    // Called by a public twin, in f64 a library function, a closure or an operator.
+    // Helpers of a public twin that in f64 are a library function, a closure or an operator.
     let helpers = [
         "is_point_light",
         "squared_length",

@@ -1,8 +1,9 @@
-//! Throughput against the other crates, chunk by chunk in turn, so that the machine's noise cancels in the ratios.
+//! Throughput compared with the other crates, which trace each chunk of rays in turn so that the machine's noise
+//! cancels in the ratios.
 //!
-//! `cargo bench -p lumbre_rays --bench ratios [-- PART_OF_A_SCENE_OR_BATCH]`
-//! Millions of rays per second on one thread by the median chunk, and how many times faster ours is: median and
-//! quartiles over all chunks. Above 1 ours is faster.
+//! `cargo bench -p lumbre_rays --bench ratios [-- PART_OF_A_SCENE_OR_BATCH]` prints millions of rays per second on
+//! one thread from the median chunk, and how many times faster ours is, as median and quartiles over all chunks.
+//! Above 1 ours is faster.
 
 mod contestants;
 
@@ -12,7 +13,7 @@ use contestants::batches::Batch;
 use contestants::tracers::Tracer;
 use contestants::{Case, cases};
 
-/// Rays per turn: short against the machine's interruptions, long against the clock's reading.
+/// Rays per chunk: few enough to avoid the machine's interruptions, many enough for the resolution of the clock.
 const CHUNK: usize = 2048;
 const ROUNDS: usize = 5;
 
@@ -37,7 +38,7 @@ fn compare(case: &Case, batch: &Batch) -> String {
     for round in 0..ROUNDS {
         for (turn, chunk) in batch.rays.chunks(CHUNK).enumerate() {
             for i in 0..tracers.len() {
-                // Everyone begins as often as everyone else.
+                // Each tracer goes first equally often.
                 let i = (i + turn + round) % tracers.len();
                 let start = Instant::now();
                 case.tracers.trace(tracers[i], batch.any, chunk);

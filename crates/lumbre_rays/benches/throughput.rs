@@ -1,7 +1,7 @@
-//! Millions of rays per second of every crate, scene and batch, by divan.
+//! Millions of rays per second of every crate, scene and batch, measured by divan.
 //!
-//! `cargo bench -p lumbre_rays --bench throughput [-- FILTER]`
-//! For ratios that the machine's noise does not spoil: `--bench ratios`.
+//! Run `cargo bench -p lumbre_rays --bench throughput [-- FILTER]`. For ratios that the machine's noise does not
+//! distort use `--bench ratios`.
 
 mod contestants;
 

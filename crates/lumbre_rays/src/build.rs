@@ -1,5 +1,5 @@
-//! Builds the eight-wide hierarchy: a binary one by obvhs (PLOC and reinsertion), then its collapse (`collapse`).
-//! Not traversal, and not a judge of triangles: those without area never come here.
+//! Builds the eight-wide hierarchy: a binary one by obvhs (PLOC and reinsertion), which `collapse` then makes wide.
+//! Triangles without area have already been removed by the caller.
 
 use glam::{Vec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -11,26 +11,28 @@ use crate::collapse::collapse;
 use crate::median_split::build_balanced;
 use crate::wide_tree::WideTree;
 
-/// Nodes that reinsertion tries to place better, as far as the shares below allow: about a second on a loaded machine.
-/// Measured on 69,000 triangles in a room, half of the nodes instead of a seventh made closest hits 1.15 and any hits
-/// 1.2 times as fast and the build 3 times as long.
+/// Number of nodes that reinsertion tries to place better, within the shares below: about a second on a loaded
+/// machine. Measured on 69,000 triangles in a room, trying half of the nodes instead of a seventh made closest hits
+/// 1.15 and any hits 1.2 times as fast and the build 3 times as slow.
 const REINSERTED_NODES: f32 = 80_000.0;
 
-/// The least and the largest share of the nodes that it tries.
+/// The smallest and the largest share of the nodes that it tries.
 const REINSERTED_SHARE: [f32; 2] = [0.15, 0.6];
 
-/// Of the box around all, how far the one in which the Morton curve runs reaches beyond it: two of its 2^21 cells.
+/// How far the box in which the Morton curve runs extends beyond the box around all primitives, as a fraction of
+/// the latter: two of its 2^21 cells.
 const BEYOND: f32 = 1.0 / (1 << 20) as f32;
 
-/// Clusters each way among which PLOC looks for the one to merge with; and rounds at first in which it looks at the next ones only.
+/// How many clusters to each side PLOC searches for the one to merge with; and in how many of the first rounds it
+/// only looks at the next ones.
 const SEARCH_DISTANCE: usize = 14;
 const NEIGHBOURS_ONLY: usize = 3;
 
-/// PLOC and reinsertion choose by surface area, so among n equal boxes both take quadratic time. A mesh with a pile
-/// of more than this many is split at the median instead.
+/// PLOC and reinsertion choose by surface area, so both take quadratic time among n equal boxes. A mesh with more
+/// equal boxes than this is split at the median instead.
 const MOST_COINCIDENT: usize = 64;
 
-/// The hierarchy of (index, canonical triangle) pairs; every triangle finite.
+/// Builds the hierarchy of (index, canonical triangle) pairs, all of them finite.
 pub(crate) fn build(triangles: &[(u32, [Vec3; 3])]) -> WideTree {
     let mut tree = WideTree::default();
     if triangles.is_empty() {
@@ -49,10 +51,11 @@ pub(crate) fn build(triangles: &[(u32, [Vec3; 3])]) -> WideTree {
     tree
 }
 
-/// A binary tree over the boxes by PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy
-/// Construction", 2018). Done by its parts, as the whole sorts the boxes along a Morton curve that wraps around: what lies in the highest planes
-/// of the box around all, a room's ceiling and two of its walls, was sorted among what lies in the lowest, and merged with it. The scene
-/// "walls in small triangles" of the benchmarks shows what that costs.
+/// Builds a binary tree over the boxes by PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for
+/// Bounding Volume Hierarchy Construction", 2018). The single steps of obvhs are called here because its complete
+/// builder sorts the boxes along a Morton curve that wraps around: boxes in the highest planes of the bounds, such
+/// as a room's ceiling and two of its walls, were sorted among those in the lowest and merged with them. The
+/// benchmark scene "walls in small triangles" shows the cost of that.
 fn clustered(boxes: &[Aabb]) -> Bvh2 {
     let mut binary = Bvh2::zeroed(boxes.len());
     binary.primitive_indices = (0..boxes.len() as u32).collect();
@@ -70,7 +73,7 @@ fn clustered(boxes: &[Aabb]) -> Bvh2 {
     binary
 }
 
-/// Size of the largest set of equal boxes.
+/// Returns the size of the largest set of equal boxes.
 fn most_coincident(boxes: &[Aabb]) -> usize {
     let mut keys: Vec<[u32; 6]> = boxes
         .iter()
@@ -84,7 +87,7 @@ fn most_coincident(boxes: &[Aabb]) -> usize {
 mod tests {
     use super::*;
 
-    /// The boxes of the triangles on the six walls of a room, each cut into `2 n²`.
+    /// The boxes of the triangles on the six walls of a room, with `2 n²` triangles on each wall.
     fn walls(n: u32) -> Vec<Aabb> {
         let mut boxes = Vec::new();
         let step = 2.0 / n as f32;
@@ -106,7 +109,7 @@ mod tests {
         boxes
     }
 
-    /// Area of all nodes with children over that of the first: what a ray meets of them, about.
+    /// Area of all inner nodes over that of the root: roughly the number of nodes that a ray visits.
     fn nodes_met(binary: &Bvh2) -> f64 {
         let inner = binary.nodes.iter().filter(|node| !node.is_leaf());
         let area = inner.map(|node| f64::from(node.aabb().half_area())).sum::<f64>();
@@ -118,8 +121,9 @@ mod tests {
         for n in [4, 12, 40, 120] {
             let boxes = walls(n);
             let met = nodes_met(&clustered(&boxes));
-            // Each level of walls, their quarters and so on has about the area of the room, and there are somewhat more of them than in a tree that
-            // is balanced. Joined across the room most nodes are as long as it, and there are n² of them: 4 to 47 times as many are met then.
+            // Each level (walls, their quarters and so on) has about the area of the room, and there are somewhat
+            // more levels than in a balanced tree. If boxes are joined across the room, most nodes are as long as
+            // the room and there are n² of them, so that 4 to 47 times as many are visited.
             let levels = f64::from(boxes.len() as u32).log2();
             println!("{} boxes: {met:.1} nodes met, {levels:.1} levels", boxes.len());
             assert!(met < 3.0 * levels, "{met} of {levels} levels");

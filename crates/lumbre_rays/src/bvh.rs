@@ -1,4 +1,4 @@
-//! The bounding volume hierarchy and its questions: the closest hit, any hit. Not the tree's layout (`build`).
+//! The bounding volume hierarchy and its queries: closest hit and any hit. How the tree is built is in `build`.
 
 use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec3;
@@ -9,26 +9,27 @@ use crate::ray_setup::RaySetup;
 use crate::wide_tree::WideTree;
 use crate::{Hit, Ray};
 
-/// A hierarchy over triangles, immutable once built and shared freely between threads.
+/// A hierarchy over triangles. It is immutable once built and can be shared freely between threads.
 ///
-/// Scaling triangles and rays by a power of two leaves every answer bit-identical (distances scaled exactly).
+/// Scaling triangles and rays by a power of two leaves every result bit-identical (with distances scaled exactly).
 #[derive(Clone, Debug)]
 pub struct Bvh {
     tree: WideTree,
     scale: CanonicalScale,
-    /// Canonical corners of the box around all triangles.
+    /// Canonical corners of the bounding box of all triangles.
     bounds: [Vec3; 2],
     skipped: Vec<u32>,
-    /// The instructions this machine has; every level computes the same bits.
+    /// The instruction sets of this machine; the results are bit-identical on all of them.
     level: Level,
 }
 
 impl Bvh {
-    /// Builds over counter-clockwise triangles in metres; a hit names a triangle by its place in this list.
+    /// Builds a hierarchy over triangles in metres, counter-clockwise on their front; a hit refers to a triangle by
+    /// its index in this list.
     ///
-    /// Triangles with a NaN or infinite coordinate or without area can be hit by no ray; they are left out
-    /// and listed by [`skipped`](Self::skipped). An empty list gives a hierarchy that nothing hits.
-    /// At most 2^29 triangles are taken; those after are listed as skipped.
+    /// Triangles with a NaN or infinite coordinate or without area cannot be hit by any ray; they are left out and
+    /// listed by [`skipped`](Self::skipped). An empty list gives a hierarchy that nothing hits. At most 2^29
+    /// triangles are kept; those after are listed as skipped.
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
         const MOST_TRIANGLES: usize = 1 << 29;
         let (mut kept, mut skipped) = (Vec::with_capacity(triangles.len()), Vec::new());
@@ -56,34 +57,36 @@ impl Bvh {
         Self { tree: build(&kept), scale, bounds, skipped, level: Level::new() }
     }
 
-    /// Indices of the triangles that were left out, ascending.
+    /// Indices of the triangles that were left out, in ascending order.
     pub fn skipped(&self) -> &[u32] {
         &self.skipped
     }
 
-    /// The two corners of the box around all triangles, in metres; both zero if there are none.
+    /// The two corners of the bounding box of all triangles, in metres; both zero if there are none.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.bounds.map(|corner| corner * self.scale.to_world)
     }
 
-    /// The nearest triangle within the ray's range; at equal distances the one first in the list.
+    /// Returns the nearest triangle within the ray's range; of several at the same distance, the one with the
+    /// lowest index.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.closest_hit_filtered(ray, |_, _, _| true)
     }
 
-    /// The nearest triangle for which `accept(triangle, u, v)` holds: alpha masks, one-sided surfaces.
+    /// Returns the nearest triangle for which `accept(triangle, u, v)` returns true, for alpha masks and one-sided
+    /// surfaces.
     ///
-    /// `accept` is asked in no particular order, and also for hits that prove not to be the nearest.
+    /// `accept` is called in no particular order, and also for hits that turn out not to be the nearest.
     pub fn closest_hit_filtered(&self, ray: &Ray, accept: impl Fn(u32, f32, f32) -> bool) -> Option<Hit> {
         self.trace::<false>(ray, accept)
     }
 
-    /// Whether any triangle lies within the ray's range: shadow rays.
+    /// Returns true if there is any triangle within the ray's range, for shadow rays.
     pub fn any_hit(&self, ray: &Ray) -> bool {
         self.any_hit_filtered(ray, |_, _, _| true)
     }
 
-    /// Whether any triangle for which `accept(triangle, u, v)` holds lies within the ray's range.
+    /// Returns true if any triangle for which `accept(triangle, u, v)` returns true is within the ray's range.
     pub fn any_hit_filtered(&self, ray: &Ray, accept: impl Fn(u32, f32, f32) -> bool) -> bool {
         self.trace::<true>(ray, accept).is_some()
     }
@@ -113,10 +116,11 @@ impl Bvh {
     }
 }
 
-/// Finite, and with a normal that is not exactly zero.
+/// Returns true if the triangle is finite and its normal is not exactly zero.
 fn has_area(triangle: &[Vec3; 3]) -> bool {
     let [a, b, c] = triangle.map(|vertex| vertex.as_dvec3());
-    // In f64 the differences are exact or nearly so, and the products of f32 sizes neither overflow nor vanish.
+    // In f64 the differences are exact or nearly so, and products of numbers in the range of f32 neither overflow
+    // nor underflow to zero.
     let normal = (b - a).cross(c - a);
     triangle.iter().all(|vertex| vertex.is_finite()) && normal.length_squared() > 0.0
 }
@@ -147,12 +151,12 @@ mod tests {
             .collect()
     }
 
-    /// Both must give the same answers to the last bit, and not only misses.
+    /// Both hierarchies must give bit-identical results, and not only misses.
     fn assert_same(a: &Bvh, b: &Bvh, triangles: &[[Vec3; 3]]) {
         let (mut state, mut hits) = (7, 0);
         for i in 0..20_000 {
             let origin = point(&mut state);
-            // Every other ray at a vertex or along an axis, where the exact edge functions decide.
+            // Every other ray goes to a vertex or along an axis, where the exact edge functions decide.
             let direction = match i % 4 {
                 0 => triangles[i % 500][i % 3] - origin,
                 1 => Vec3::AXES[i % 3],

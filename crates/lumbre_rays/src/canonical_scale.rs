@@ -1,7 +1,7 @@
-//! The power of two that brings a scene's largest coordinate into [1, 2).
+//! The power of two that scales a scene's largest coordinate to [1, 2).
 //!
-//! Multiplying by a power of two is exact, so a scene scaled by 2^k is traced with the very same numbers:
-//! no threshold, no overflow and no underflow depends on the unit of length. Not a bounding box.
+//! Multiplying by a power of two is exact, so a scene scaled by 2^k is traced with exactly the same numbers: no
+//! threshold, overflow or underflow depends on the unit of length.
 
 use glam::Vec3;
 
@@ -15,7 +15,7 @@ pub(crate) struct CanonicalScale {
 }
 
 impl CanonicalScale {
-    /// For a scene whose largest absolute coordinate is `largest`, which must be finite.
+    /// Creates the scale for a scene whose largest absolute coordinate is `largest`, which must be finite.
     pub fn for_largest(largest: f32) -> Self {
         // Both 2^e and 2^-e are normal numbers for |e| <= 126.
         let exponent = (((largest.to_bits() >> 23) & 0xff) as i32 - 127).clamp(-126, 126);

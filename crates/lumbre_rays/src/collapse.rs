@@ -1,8 +1,8 @@
-//! Collapses a binary tree into eight-wide nodes and blocks of triangles, at the least expected cost by surface area.
+//! Collapses a binary tree into eight-wide nodes and blocks of triangles at the lowest expected cost by surface
+//! area. The binary tree is built in `build`.
 //!
-//! Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017,
-//! section 3.1: dynamic programming over the number of wide children that a binary subtree becomes.
-//! Not the binary tree's builder.
+//! The method is dynamic programming over the number of wide children that a binary subtree becomes: Ylitie,
+//! Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.1.
 
 use glam::Vec3;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
@@ -11,19 +11,20 @@ use crate::triangle_block::TriangleBlock;
 use crate::wide_node::ChildRef;
 use crate::wide_tree::WideTree;
 
-/// Cost of a visit to a node, in tests of a block; measured (`cargo bench -p lumbre_rays --bench ratios`).
+/// Cost of visiting a node, in units of testing a block; measured (`cargo bench -p lumbre_rays --bench ratios`).
 const NODE_COST: f32 = 0.5;
 
-/// The cheapest ways to let a binary subtree become wide children.
+/// The cheapest ways to turn a binary subtree into wide children.
 #[derive(Clone, Copy, Default)]
 struct Plan {
-    /// Triangles below.
+    /// Number of triangles in the subtree.
     count: u32,
-    /// Becomes a block, where it becomes one child.
+    /// Whether it becomes a block when it becomes a single child.
     block: bool,
-    /// Of i + 1 children (the last: of a node of its own), how many are the left one's; 0 where one fewer is better.
+    /// How many of i + 1 children are for the left subtree (the last entry is for a node of its own with eight
+    /// children); 0 where one child fewer is cheaper.
     left: [u8; 8],
-    /// Expected cost of at most i + 1 children.
+    /// Expected cost with at most i + 1 children.
     cost: [f32; 7],
 }
 
@@ -78,7 +79,7 @@ fn plans(binary: &Bvh2) -> Vec<Plan> {
 fn combine(area: f32, left: &Plan, right: &Plan) -> Plan {
     let count = left.count + right.count;
     let mut plan = Plan { count, block: false, left: [0; 8], cost: [f32::INFINITY; 7] };
-    // Shared out among i + 1 children, both sides having at least one.
+    // Costs of distributing i + 1 children over both sides, each of which gets at least one.
     let mut shared = [f32::INFINITY; 8];
     for (i, best) in shared.iter_mut().enumerate().skip(1) {
         for of_left in 1..=i {
@@ -103,14 +104,14 @@ fn combine(area: f32, left: &Plan, right: &Plan) -> Plan {
     plan
 }
 
-/// The binary nodes that become the children of a wide node.
+/// Returns the binary nodes that become the children of a wide node.
 fn wide_children(binary: &Bvh2, plans: &[Plan], index: usize) -> Vec<usize> {
     let mut children = Vec::with_capacity(8);
     if plans[index].block {
-        // Only the root comes here as a block.
+        // Only the root can be a block here.
         return vec![index];
     }
-    // (binary node, children it may become, may it become one)
+    // (binary node, number of children it may become, whether it may become a single one)
     let mut pending = vec![(index, 8usize, false)];
     while let Some((index, mut share, whole)) = pending.pop() {
         let plan = &plans[index];

@@ -1,6 +1,6 @@
 //! Bounding volume hierarchy and watertight ray casting over triangles.
 //!
-//! Rays against triangles and nothing else: no lights, no materials, no ECS, no GPU.
+//! This crate only intersects rays with triangles: it has no lights, no materials, no ECS and no GPU code.
 //!
 //! ```text
 //!   triangles ──► Bvh::build ──► canonical scale (2^k) ──► obvhs binary tree ──► collapse to eight-wide nodes
@@ -19,15 +19,17 @@
 //!      node block   node     a ray of octant o visits the lanes i ^ o, i = 0 .. 7
 //! ```
 //!
-//! - Watertight: a ray that meets the shared edge or vertex of a closed surface hits it
-//!   (Woop, Benthin, Wald 2013; Ize 2013).
-//! - Free of scale: no absolute epsilon. Multiplying a scene by 2^k changes no hit.
-//! - Deterministic: the same triangles give the same tree; ties go to the lower index. AVX2 is used where the machine
-//!   has it, the target's baseline elsewhere, and no product is fused with a sum: both compute the same bits.
-//! - Fast: for rays as a bake casts them no other crate answers faster in any scene measured; for camera rays the fastest is level or ahead in
-//!   three of the five. Millions of rays per second on one thread of an EPYC (2 shared cores), and our rate over that of obvhs 0.4's `CwBvh` (slow build),
-//!   which is not watertight. `cargo bench -p lumbre_rays --bench ratios` prints them with quartiles and the other crates; `--bench throughput`
-//!   prints divan's table.
+//! - Watertight: a ray that meets a shared edge or vertex of a closed surface hits the surface (Woop, Benthin, Wald
+//!   2013; Ize 2013).
+//! - Independent of scale: no absolute epsilon. Multiplying a scene by 2^k changes no hit.
+//! - Deterministic: the same triangles give the same tree, and ties go to the lower index. AVX2 is used where the
+//!   machine has it and the target's baseline elsewhere; products are never fused with sums, so that both compute
+//!   the same bits.
+//! - Fast: with the rays that a bake casts no other measured crate is faster in any scene; with camera rays the
+//!   fastest is level or ahead in three of the five. The table has millions of rays per second on one thread of an
+//!   EPYC (2 shared cores), and their ratio to the rate of obvhs 0.4's `CwBvh` (slow build), which is not
+//!   watertight. `cargo bench -p lumbre_rays --bench ratios` prints these figures with quartiles and the other
+//!   crates; `--bench throughput` prints divan's table.
 //!
 //! | scene, triangles | camera, closest | cosine, closest | cosine, any | to the lamp, any |
 //! |---|---|---|---|---|

@@ -1,5 +1,5 @@
-//! Builds the eight-wide hierarchy by splitting at the median: balanced whatever the triangles are, in n log^2 n.
-//! Not the usual builder: piles of equal boxes, on which PLOC takes quadratic time, come here (see `build`).
+//! Builds the eight-wide hierarchy by splitting at the median, which is balanced for any triangles and takes n
+//! log^2 n. It is only used for meshes with piles of equal boxes, on which PLOC takes quadratic time (see `build`).
 
 use std::ops::Range;
 
@@ -38,7 +38,7 @@ pub(crate) fn build_balanced(tree: &mut WideTree, triangles: &[(u32, [Vec3; 3])]
     }
 }
 
-/// Sorts a range along the axis on which its centres lie farthest apart, and cuts it in the middle.
+/// Sorts a range along the axis with the largest extent of its centres, and cuts it in the middle.
 fn halves(triangles: &mut [(u32, [Vec3; 3])], range: Range<usize>) -> [Range<usize>; 2] {
     let middle = range.start + range.len() / 2;
     let members = &mut triangles[range.clone()];

@@ -1,5 +1,5 @@
-//! Rays: an origin, a direction and the range of distances that counts. Not the offset that keeps a ray off
-//! the surface it leaves: that is `ray_offset`.
+//! Rays: an origin, a direction and a range of distances. The offset that keeps a ray off the surface that it
+//! leaves is in `ray_offset`.
 
 use glam::Vec3;
 
@@ -11,9 +11,9 @@ use glam::Vec3;
 pub struct Ray {
     /// Where the ray starts, in metres.
     pub origin: Vec3,
-    /// Where it goes; its length is the unit of every distance.
+    /// Direction of the ray; its length is the unit of every distance.
     pub direction: Vec3,
-    /// Smallest distance that counts, inclusive; below 0 is read as 0.
+    /// Smallest distance that counts, inclusive; negative values are treated as 0.
     pub t_min: f32,
     /// Largest distance that counts, inclusive; may be infinite.
     pub t_max: f32,
@@ -32,34 +32,34 @@ impl Ray {
         Self { origin: from, direction: to - from, t_min: 0.0, t_max: 1.0 }
     }
 
-    /// The same ray, cut to distances in [`t_min`, `t_max`].
+    /// The same ray with its distances restricted to [`t_min`, `t_max`].
     pub fn with_range(self, t_min: f32, t_max: f32) -> Self {
         Self { t_min, t_max, ..self }
     }
 
-    /// The point at a distance.
+    /// Returns the point at a distance.
     pub fn at(&self, distance: f32) -> Vec3 {
         self.origin + self.direction * distance
     }
 }
 
-/// Where a ray meets a triangle.
+/// The intersection of a ray with a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Index of the triangle in the list the hierarchy was built from.
+    /// Index of the triangle in the list that the hierarchy was built from.
     pub triangle: u32,
     /// Distance along the ray, in units of its direction.
     pub distance: f32,
     /// Weights (u, v) of the second and third vertex, each in [0, 1]; the first has 1 - u - v.
     pub barycentric: (f32, f32),
-    /// The ray came from the side on which the vertices run clockwise.
+    /// Whether the ray came from the side on which the vertices run clockwise.
     pub back_face: bool,
 }
 
 impl Hit {
-    /// The point hit, interpolated from the vertices of the triangle that was hit.
+    /// Returns the point that was hit, interpolated from the vertices of the triangle that was hit.
     ///
-    /// More accurate than `Ray::at`: its error does not grow with the distance.
+    /// It is more accurate than `Ray::at`, as its error does not grow with the distance.
     pub fn position(&self, triangle: &[Vec3; 3]) -> Vec3 {
         let (u, v) = (f64::from(self.barycentric.0), f64::from(self.barycentric.1));
         let [a, b, c] = triangle.map(|vertex| vertex.as_dvec3());

@@ -1,5 +1,5 @@
-//! What is computed once per ray: the shear of the triangle test and the widened slabs of the box test.
-//! Not the tests themselves: those are `triangle_block` and `wide_node`.
+//! What is computed once per ray: the shear of the triangle test and the widened slabs of the box test. The tests
+//! are in `triangle_block` and `wide_node`.
 
 use std::ops::RangeInclusive;
 
@@ -8,28 +8,29 @@ use glam::Vec3;
 use crate::Ray;
 use crate::visit_order::octant;
 
-/// Units in the last place by which the box test is widened, times the ray's reach into the scene.
+/// How far the box test is widened, relative to the ray's reach into the scene.
 ///
-/// Woop, Benthin, Wald 2013, section 4, bound the error of the sheared vertices by 5 * 2^-24; 8 leaves room for
-/// the rounding of the widening itself.
+/// Woop, Benthin, Wald 2013, section 4, bound the error of the sheared vertices by 5 * 2^-24; 8 leaves room for the
+/// rounding of the widening itself.
 const SHEAR_ERROR: f32 = 8.0 / (1 << 24) as f32;
 
-/// The dominant axis and a component are this far apart at most; a smaller component moves the ray across the
-/// whole scene by less than `SHEAR_ERROR` and would make 1/0.
+/// Largest ratio of the dominant component of a direction to another. A smaller component moves the ray by less
+/// than `SHEAR_ERROR` across the whole scene, and its reciprocal could be infinite.
 const LARGEST_RATIO: f32 = (1u64 << 26) as f32;
 
-/// Sizes of the direction for which no reciprocal leaves the normal numbers; what is shorter counts as zero.
+/// Range of the dominant component for which all reciprocals are normal numbers; a shorter direction counts as
+/// zero.
 const DIRECTION_RANGE: RangeInclusive<f32> = 1e-30..=1e30;
 
 /// A ray in canonical units, prepared for traversal.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RaySetup {
     pub origin: [f32; 3],
-    /// x, y, z of the sheared space; z is the axis along which the ray runs most.
+    /// Axes that become x, y, z of the sheared space; z is the dominant axis of the ray.
     pub axis: [usize; 3],
-    /// Shear of x and y, scale of z.
+    /// Shear of x and y, and scale of z.
     pub shear: [f32; 3],
-    /// Bit per axis: the direction is negative.
+    /// One bit per axis, set if the direction is negative.
     pub octant: u32,
     /// Index (0 = minimum, 1 = maximum) of the plane entered first, per axis.
     pub near_side: [usize; 3],
@@ -41,7 +42,7 @@ pub(crate) struct RaySetup {
 }
 
 impl RaySetup {
-    /// `None` where the ray can hit nothing. `bounds` are the scene's, canonical.
+    /// Returns `None` if the ray cannot hit anything. `bounds` are the scene's, in canonical units.
     #[inline(always)]
     pub fn new(ray: &Ray, to_canonical: f32, bounds: &[Vec3; 2]) -> Option<Self> {
         let origin = ray.origin * to_canonical;
@@ -57,7 +58,7 @@ impl RaySetup {
         let dominant = direction[z];
         let reciprocal_z = 1.0 / dominant;
         let t_min = (ray.t_min * to_canonical).max(0.0);
-        // An infinite distance is no hit, so that a determinant which underflows is none either.
+        // An infinite distance is not a hit, which rules out those of a determinant that underflows.
         let t_max = ray.t_max * to_canonical;
         let accepted = origin.is_finite()
             && ray.direction.is_finite()
@@ -68,7 +69,7 @@ impl RaySetup {
         if !accepted {
             return None;
         }
-        // The winding is kept by swapping x and y where z is mirrored.
+        // Where z is mirrored, x and y are swapped to keep the winding.
         let (x, y) = match (z, dominant < 0.0) {
             (0, false) => (1, 2),
             (0, true) => (2, 1),

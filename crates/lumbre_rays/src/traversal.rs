@@ -1,4 +1,5 @@
-//! Walks the eight-wide tree with a ray. Not the geometry tests it calls, nor the order of a node's children.
+//! Traverses the eight-wide tree with a ray. The geometry tests are in `triangle_block` and `wide_node`, the order
+//! of a node's children in `visit_order`.
 
 use fearless_simd::Simd;
 
@@ -9,10 +10,10 @@ use crate::visit_order::visits;
 use crate::wide_node::NodeRay;
 use crate::wide_tree::WideTree;
 
-/// Levels whose stack needs no allocation.
+/// Trees up to this depth are traversed without allocating the stack.
 const SHORT: usize = 16;
 
-/// Children of a node that wait for their visit.
+/// Children of a node that are still to be visited.
 #[derive(Clone, Copy, Default)]
 struct Waiting {
     node: u32,
@@ -20,7 +21,7 @@ struct Waiting {
     lanes: u32,
 }
 
-/// Where the traversal stands with its search.
+/// The state of a traversal's search.
 struct Search<'a, S: Simd, F> {
     ray: BlockRay<S>,
     blocks: &'a [TriangleBlock],
@@ -31,7 +32,7 @@ struct Search<'a, S: Simd, F> {
 }
 
 impl<S: Simd, F: Fn(u32, f32, f32) -> bool> Search<'_, S, F> {
-    /// Tests a block and takes its hits; true ends the traversal.
+    /// Tests a block and records its hits; returns true if the traversal is finished.
     #[inline(always)]
     fn test(&mut self, block: usize) -> bool {
         let Some(block) = self.blocks.get(block) else { return false };
@@ -41,12 +42,12 @@ impl<S: Simd, F: Fn(u32, f32, f32) -> bool> Search<'_, S, F> {
             let lane = lanes.trailing_zeros() as usize & 7;
             lanes &= lanes - 1;
             let (triangle, distance) = (block.ids[lane], hits.distance[lane]);
-            // Of two triangles at the same distance the first in the list wins, whatever the shape of the tree.
+            // Of two triangles at the same distance the lower index wins, regardless of the shape of the tree.
             let nearer = self.best.is_none_or(|best| (distance, triangle) < (best.distance, best.triangle));
             if !nearer {
                 continue;
             }
-            // The quotients may round past 1 by one unit in the last place.
+            // The quotients may be rounded to one unit in the last place above 1.
             let u = hits.u[lane].clamp(0.0, 1.0);
             let v = hits.v[lane].clamp(0.0, 1.0 - u);
             if !(self.filter)(triangle, u, v) {
@@ -64,7 +65,7 @@ impl<S: Simd, F: Fn(u32, f32, f32) -> bool> Search<'_, S, F> {
 }
 
 impl WideTree {
-    /// The closest hit, or with `ANY` one of them; distances in canonical units.
+    /// Returns the closest hit, or with `ANY` any hit; distances are in canonical units.
     #[inline(always)]
     pub fn trace<const ANY: bool, S: Simd, F: Fn(u32, f32, f32) -> bool>(
         &self,
@@ -72,7 +73,7 @@ impl WideTree {
         setup: &RaySetup,
         filter: F,
     ) -> Option<Hit> {
-        // Few trees are deeper than the array; a tree of a pile of slivers may be.
+        // Few trees are deeper than the array; that of a pile of slivers may be.
         let (mut short, mut long);
         let stack = if self.depth <= SHORT {
             short = [Waiting::default(); SHORT];
@@ -98,7 +99,7 @@ impl WideTree {
         let mut lanes = visits(entered, octant);
         loop {
             if lanes == 0 {
-                // Children that wait, but those behind what was hit since.
+                // Resume with the waiting children, except those that are beyond a hit found since.
                 if depth == 0 {
                     return search.best;
                 }
@@ -115,7 +116,7 @@ impl WideTree {
                 continue;
             }
             if ANY {
-                // Blocks before nodes: whichever stops the ray ends the search.
+                // Blocks before nodes: the first hit ends the search.
                 let mut blocks = lanes & visits(node.blocks, octant);
                 lanes &= !blocks;
                 while blocks != 0 {
@@ -142,7 +143,7 @@ impl WideTree {
                 }
             } else {
                 if lanes != 0 {
-                    // At most one entry per level waits, so there always is a slot.
+                    // At most one entry per level waits, so there is always a slot.
                     if let Some(slot) = stack.get_mut(depth) {
                         *slot = Waiting { node: index, lanes };
                         depth += 1;

@@ -1,8 +1,8 @@
-//! Eight triangles side by side and the watertight ray/triangle test over them.
+//! Eight triangles side by side, and the watertight ray/triangle test over them.
 //!
 //! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. Two triangles that share an edge
-//! compute the same edge function with opposite signs, so no ray passes between them. No product is fused with a
-//! sum, so every machine computes the same bits. Not a shading lookup.
+//! compute the same edge function with opposite signs, so that no ray passes between them. Products are never fused
+//! with sums, so that every machine computes the same bits.
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 use glam::Vec3;
@@ -10,8 +10,8 @@ use glam::Vec3;
 use crate::ray_setup::RaySetup;
 use crate::wide_node::spread;
 
-/// Up to eight triangles, `vertices[vertex][axis]`, one per lane. Lanes without a triangle hold NaN, which no
-/// comparison accepts.
+/// Up to eight triangles, `vertices[vertex][axis]`, one per lane. Lanes without a triangle are NaN, which fails
+/// every comparison.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct TriangleBlock {
@@ -20,21 +20,21 @@ pub(crate) struct TriangleBlock {
 }
 
 impl TriangleBlock {
-    /// Triangles that a block holds at most.
+    /// Largest number of triangles in a block.
     pub const SIZE: usize = 8;
 }
 
-/// What the test found in a block: the lanes that hit, and their values.
+/// The lanes of a block that were hit, and the values of all lanes.
 pub(crate) struct BlockHits {
     pub lanes: u32,
     pub distance: [f32; 8],
     pub u: [f32; 8],
     pub v: [f32; 8],
-    /// Bit per lane: seen from the back.
+    /// One bit per lane, set if the triangle was hit from its back.
     pub back: u32,
 }
 
-/// The ray's constants, spread over lanes.
+/// The ray's constants, broadcast to all lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct BlockRay<S: Simd> {
     origin: [f32x8<S>; 3],
@@ -57,7 +57,7 @@ impl<S: Simd> BlockRay<S> {
         }
     }
 
-    /// Vertices in the ray's space, where it runs along z from the origin.
+    /// Transforms vertices to the ray's space, where the ray runs along z from the origin.
     #[inline(always)]
     fn shear(&self, vertex: &[[f32; 8]; 3]) -> [f32x8<S>; 3] {
         let [x, y, z] = self.axis;
@@ -71,7 +71,7 @@ impl<S: Simd> BlockRay<S> {
 }
 
 impl TriangleBlock {
-    /// From up to eight (index, canonical triangle) pairs.
+    /// Creates a block of up to eight (index, canonical triangle) pairs.
     pub fn new(triangles: &[(u32, [Vec3; 3])]) -> Self {
         let mut vertices = [[[f32::NAN; 8]; 3]; 3];
         let mut ids = [u32::MAX; 8];
@@ -86,7 +86,8 @@ impl TriangleBlock {
         Self { vertices, ids }
     }
 
-    /// Tests the eight lanes; distances in [t_min, `t_max`] count, both included.
+    /// Tests all eight lanes. Distances in [t_min, `t_max`] count, inclusive at both ends. Returns `None` if no
+    /// lane is hit.
     #[inline(always)]
     pub fn intersect<S: Simd>(&self, ray: &BlockRay<S>, t_max: f32) -> Option<BlockHits> {
         let simd = ray.simd;
@@ -107,7 +108,7 @@ impl TriangleBlock {
         let largest = simd.max_f32x8(simd.max_f32x8(u, v), w);
         let determinant = u + v + w;
         let inside = simd.simd_ge_f32x8(smallest, zero) | simd.simd_le_f32x8(largest, zero);
-        // NaN differs from zero and is no side of it.
+        // A NaN determinant passes this test, but its lane fails the comparisons with zero above.
         let inside = inside & !simd.simd_eq_f32x8(determinant, zero);
         if !simd.any_true_mask32x8(inside) {
             return None;
@@ -130,7 +131,7 @@ impl TriangleBlock {
     }
 }
 
-/// a * b - c * d with the exact sign: products of two f32 are exact in f64.
+/// Returns a * b - c * d with the exact sign: products of two f32 are exact in f64.
 #[cold]
 fn edge_function(a: &[f32; 8], b: &[f32; 8], c: &[f32; 8], d: &[f32; 8]) -> [f32; 8] {
     std::array::from_fn(|i| {

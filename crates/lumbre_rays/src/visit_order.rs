@@ -1,7 +1,8 @@
-//! The order in which the children of a node are visited: front to back by the octant of the ray's direction.
+//! The order in which the children of a node are visited: front to back, by the octant of the ray's direction. The
+//! box test is in `wide_node`.
 //!
 //! Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017,
-//! section 3.2: children are put into lanes so that lane ^ octant rises along the ray. Not the box test.
+//! section 3.2: children are assigned to lanes so that lane ^ octant increases along the ray.
 
 use glam::Vec3;
 
@@ -28,26 +29,28 @@ const fn order() -> [[u8; 256]; 8] {
     table
 }
 
-/// Lanes (bit per lane) in the order of a visit: the lowest bit comes first, and stands for lane bit ^ octant.
+/// Returns `lanes` (one bit per lane) in visiting order: the lowest bit is visited first and stands for lane bit ^
+/// octant.
 #[inline(always)]
 pub(crate) fn visits(lanes: u32, octant: u32) -> u32 {
     u32::from(ORDER[octant as usize & 7][lanes as usize & 255])
 }
 
-/// Octant of a direction: bit per axis, set where it is negative.
+/// Returns the octant of a direction: one bit per axis, set where it is negative.
 #[inline(always)]
 pub(crate) fn octant(direction: Vec3) -> u32 {
     direction.is_negative_bitmask() & 7
 }
 
-/// A lane for each of up to eight children by their centres: the best pair of child and lane first, then the best
-/// of the others.
+/// Assigns a lane to each of up to eight children by their centres, greedily: first the best pair of child and
+/// lane, then the best of the remaining ones.
 pub(crate) fn lanes(centres: &[Vec3]) -> Vec<usize> {
     let middle = centres.iter().sum::<Vec3>() / centres.len().max(1) as f32;
     let mut pairs = Vec::with_capacity(centres.len() * 8);
     for (child, &centre) in centres.iter().enumerate() {
         for lane in 0..8 {
-            // In its own octant a lane is visited first: its child should lie far against that direction.
+            // A ray in the octant of this number visits the lane first, so its child should be the farthest against
+            // that direction.
             let sign = |axis: usize| if lane >> axis & 1 == 1 { -1.0 } else { 1.0 };
             let along = Vec3::new(sign(0), sign(1), sign(2));
             pairs.push(((centre - middle).dot(along), child, lane));
@@ -84,7 +87,7 @@ mod tests {
                 waiting &= waiting - 1;
                 path.push(lanes.iter().position(|&l| l == lane).expect("eight children in eight lanes"));
             }
-            // Each axis's front half comes before its back half when the others are equal.
+            // On each axis the nearer half comes before the farther half if the other axes are equal.
             for (i, &a) in path.iter().enumerate() {
                 for &b in &path[..i] {
                     let step = (corners[a] - corners[b]) * signs;

@@ -1,4 +1,4 @@
-//! The tree answers as a brute-force f64 search does, and copes with every input.
+//! Checks that the tree gives the same results as a brute-force f64 search, and handles every input.
 
 mod common;
 
@@ -6,7 +6,7 @@ use common::{Random, cuboid, soup, sphere};
 use glam::{DVec3, Vec3};
 use lumbre_rays::{Bvh, Ray};
 
-/// Distance and determinant's relative size by Möller and Trumbore in f64; `margin` widens the triangle.
+/// Distance by Möller and Trumbore in f64, if the ray hits the triangle; `margin` widens the triangle.
 fn reference(triangle: &[Vec3; 3], ray: &Ray, margin: f64) -> Option<f64> {
     let [a, b, c] = triangle.map(|vertex| vertex.as_dvec3());
     let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
@@ -32,7 +32,7 @@ fn agrees_with_brute_force() {
         let ray = Ray::new(random.cube() * 1.5, random.direction());
         let nearest =
             |margin: f64| triangles.iter().filter_map(|t| reference(t, &ray, margin)).min_by(f64::total_cmp);
-        // f32 errors of 2^-24 times a few, over triangles of .05 and more, stay below 1e-4 of their size.
+        // f32 errors of a few times 2^-24 on triangles of .05 and more stay below 1e-4 of their size.
         let (narrow, wide) = (nearest(-1e-4), nearest(1e-4));
         match bvh.closest_hit(&ray) {
             Some(hit) => {
@@ -49,7 +49,7 @@ fn agrees_with_brute_force() {
         }
         assert_eq!(bvh.any_hit(&ray), bvh.closest_hit(&ray).is_some());
     }
-    // Otherwise the comparison says little.
+    // With few hits the comparison would mean little.
     assert!(hits > 1000, "only {hits} of 3000 rays hit");
 }
 
@@ -58,7 +58,7 @@ fn exact_distances_and_weights() {
     let bvh = Bvh::build(&cuboid(Vec3::ZERO, Vec3::new(2.0, 4.0, 8.0)));
     let inside = Ray::new(Vec3::new(0.5, 1.0, 2.0), Vec3::new(0.0, 0.0, 2.0));
     let hit = bvh.closest_hit(&inside).unwrap();
-    assert_eq!(hit.distance, 3.0); // (8 - 2) / 2: in units of the direction
+    assert_eq!(hit.distance, 3.0); // (8 - 2) / 2, in units of the direction
     assert!(hit.back_face);
     assert!(!bvh.any_hit(&inside.with_range(0.0, 2.999_999)));
     assert!(bvh.any_hit(&inside.with_range(0.0, 3.0)));
@@ -140,7 +140,7 @@ fn piles_of_triangles_build_in_time() {
             .collect();
         let start = std::time::Instant::now();
         let hit = Bvh::build(&pile).closest_hit(&ray).unwrap();
-        // Milliseconds on an idle machine; a quadratic build takes the better part of a minute.
+        // This takes milliseconds on an idle machine; a quadratic build would take the better part of a minute.
         let seconds = start.elapsed().as_secs_f64();
         eprintln!("jitter {jitter}: {seconds:.2} s");
         assert!(seconds < 10.0, "{seconds} s at {jitter}");
@@ -156,7 +156,8 @@ fn piles_of_triangles_build_in_time() {
 fn the_tree_changes_no_bit_of_an_answer() {
     let mut random = Random(21);
     let mut triangles = soup(&mut random, 80, 0.5);
-    // Faces in the planes of boxes, and twice in one place: what a box test that is not wide enough would miss.
+    // Faces in the planes of boxes and duplicates in one place, which a box test that is not wide enough would
+    // miss.
     triangles.extend(cuboid(Vec3::splat(-0.5), Vec3::splat(0.5)));
     triangles.extend(cuboid(Vec3::splat(-0.5), Vec3::new(0.5, 0.25, 0.75)));
     triangles.extend(cuboid(Vec3::NEG_ONE, Vec3::ONE));
@@ -172,7 +173,7 @@ fn the_tree_changes_no_bit_of_an_answer() {
             _ => random.direction(),
         };
         let ray = Ray::new(origin, direction);
-        // Each triangle for itself, so that no hit hides another: the same arithmetic without the culling.
+        // Each triangle is tested alone, so that no hit hides another: the same arithmetic without the culling.
         let alone: Vec<_> = (0..triangles.len() as u32)
             .filter_map(|index| bvh.closest_hit_filtered(&ray, |triangle, _, _| triangle == index))
             .collect();
@@ -183,6 +184,6 @@ fn the_tree_changes_no_bit_of_an_answer() {
         ties += alone.iter().filter(|hit| first.is_some_and(|first| hit.distance == first.distance)).count()
             - usize::from(first.is_some());
     }
-    // The two smaller boxes share a face; otherwise the order of equal distances was not tried.
+    // The two smaller boxes share a face; without ties the order of equal distances would not be tested.
     assert!(ties > 100, "{ties}");
 }

@@ -1,5 +1,5 @@
-//! No absolute length anywhere: a scene scaled by 2^k answers bit-identically, and rays leave the surface they
-//! start on at every size.
+//! Checks that there is no absolute length: a scene scaled by 2^k gives bit-identical results, and rays leave the
+//! surface that they start on at every scale.
 
 mod common;
 
@@ -47,8 +47,8 @@ proptest! {
     }
 }
 
-/// Rays from random points of a convex closed surface to the outside, down to grazing angles; a convex surface
-/// is hit by none of them. Returns the hits.
+/// Casts rays outward from random points of a convex closed surface, down to grazing angles, none of which should
+/// hit it. Returns the number of hits.
 fn hits_on_leaving(triangles: &[[Vec3; 3]], random: &mut Random, rays: usize) -> usize {
     let bvh = Bvh::build(triangles);
     (0..rays)
@@ -62,7 +62,7 @@ fn hits_on_leaving(triangles: &[[Vec3; 3]], random: &mut Random, rays: usize) ->
             let origin = offset_ray_origin(position, normal, triangle_extent(triangle));
             let along = random.direction().as_dvec3().reject_from_normalized(exact).normalize_or(exact);
             let direction = (along + exact * 10f64.powf(-6.0 * f64::from(random.unit()))).as_vec3();
-            // Rounded to f32, a grazing direction may point inward.
+            // When rounded to f32, a grazing direction may point inward.
             direction.as_dvec3().dot(exact) > 0.0 && bvh.any_hit(&Ray::new(origin, direction))
         })
         .count()
@@ -76,7 +76,7 @@ fn rays_leave_their_surface_from_a_millimetre_to_a_hundred_kilometres() {
         for centre in [Vec3::ZERO, corner] {
             let cube = cuboid(centre - Vec3::splat(size), centre + Vec3::splat(size));
             assert_eq!(hits_on_leaving(&cube, &mut random, 20_000), 0, "cube of {size} m at {centre}");
-            // The sphere's faces are slanted; its neighbours bend away by more than a grazing ray's error.
+            // The sphere's faces are slanted; neighbouring faces bend away by more than a grazing ray's error.
             let ball = sphere(2, size, centre);
             assert_eq!(hits_on_leaving(&ball, &mut random, 20_000), 0, "sphere of {size} m at {centre}");
         }
@@ -85,7 +85,7 @@ fn rays_leave_their_surface_from_a_millimetre_to_a_hundred_kilometres() {
 
 #[test]
 fn without_the_offset_rays_do_hit_the_surface_they_leave() {
-    // The negative control of the test above: an offset of nothing must be seen.
+    // Control of the test above: it must detect that there is no offset.
     let mut random = Random(5);
     let triangles = sphere(2, 1.0, Vec3::new(0.3, 0.2, 0.1));
     let bvh = Bvh::build(&triangles);

@@ -1,4 +1,5 @@
-//! No ray leaves a closed surface from inside, wherever it is aimed (hard case: rays through shared edges).
+//! Checks that no ray leaves a closed surface from inside, wherever it is aimed (hard case: rays through shared
+//! edges).
 
 mod common;
 
@@ -6,7 +7,8 @@ use common::{Random, cuboid, sphere};
 use glam::Vec3;
 use lumbre_rays::{Bvh, Ray};
 
-/// Rays from inside, a third each at random, at points of edges, and at vertices; returns those that escape.
+/// Casts rays from inside, a third each in random directions, at points on edges, and at vertices; returns the
+/// number that escape.
 fn escapes(triangles: &[[Vec3; 3]], inside: impl Fn(&mut Random) -> Vec3, rays: usize) -> usize {
     let bvh = Bvh::build(triangles);
     assert!(bvh.skipped().is_empty());
@@ -48,7 +50,7 @@ fn a_small_sphere_far_from_the_origin_and_axis_parallel_rays() {
     let centre = Vec3::new(4000.0, -3000.0, 2000.0);
     let inside = move |random: &mut Random| centre + random.cube() * 0.5;
     assert_eq!(escapes(&sphere(3, 1.0, centre), inside, 100_000), 0);
-    // From the centre of a box, exactly at face diagonals, edges and corners, with zero direction components.
+    // Rays from the centre of a box, exactly at face diagonals, edges and corners, with zero direction components.
     let bvh = Bvh::build(&cuboid(Vec3::NEG_ONE, Vec3::ONE));
     for x in -1..=1 {
         for y in -1..=1 {
@@ -63,7 +65,7 @@ fn a_small_sphere_far_from_the_origin_and_axis_parallel_rays() {
 
 #[test]
 fn a_leak_is_found_when_there_is_one() {
-    // The negative control: the same count must see a missing triangle.
+    // Control: the same count must detect a missing triangle.
     let triangles = sphere(3, 1.0, Vec3::ZERO);
     let open = &triangles[1..];
     assert!(escapes(open, |random| random.cube() * 0.5, 30_000) > 0);

@@ -1,5 +1,6 @@
-//! Draws the pictures of docs/baking.md into a folder: the Cornell box by its direct light and by all of it, what the bake states of each
-//! texel's error, and the error against the time. The last is drawn from the table that `error_against_time` of `lumbre_bake` prints.
+//! Draws the pictures of docs/baking.md into a folder: the Cornell box by its direct light and by all its light,
+//! the error that the bake states for each texel, and the error against the time. The last one is drawn from the
+//! table that `error_against_time` of `lumbre_bake` prints.
 //!
 //! `cargo run --release -p lumbre_tests --example bake_pictures -- MODEL.glb TABLE.md docs/images`
 
@@ -20,9 +21,9 @@ use lumbre_scene::{Lightmap, LightmapImage, default_camera};
 mod dots;
 mod plot;
 
-/// Pixels of a side of a frame.
+/// Side length of a frame in pixels.
 const SIDE: u32 = 360;
-/// Pixels of the strip above a frame.
+/// Height in pixels of the strip above a frame.
 const STRIP: u32 = 28;
 const WHITE: Rgb<u8> = Rgb([255; 3]);
 const BLACK: Rgb<u8> = Rgb([40; 3]);
@@ -46,7 +47,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The model baked at 256 texels a side, with bounces or without: what is black reflects nothing on.
+/// The model baked at 256 texels a side, with bounces or without; for the latter all materials are black and
+/// reflect nothing.
 fn baked(model: &Path, direct: bool) -> Result<(World, BakeReport), Box<dyn Error>> {
     let mut world = World::new();
     lumbre_scene::load(&mut world, model)?;
@@ -74,7 +76,7 @@ fn frame(gpu: &Gpu, world: &mut World, options: &FrameOptions) -> Result<RgbImag
     RgbImage::from_raw(SIDE, SIDE, rgb).ok_or_else(|| "a frame has a pixel for each place".into())
 }
 
-/// Frames beside each other under their titles.
+/// Places frames side by side, each under its title.
 fn beside(frames: &[(RgbImage, &str)]) -> RgbImage {
     let count = frames.len() as u32;
     let mut picture = RgbImage::from_pixel(count * (SIDE + 8) - 8, SIDE + STRIP, WHITE);
@@ -86,7 +88,7 @@ fn beside(frames: &[(RgbImage, &str)]) -> RgbImage {
     picture
 }
 
-/// Viridis by five of its colours.
+/// The colour map viridis, interpolated between five of its colours.
 fn heat(part: f32) -> Vec3 {
     let colors = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]
         .map(|color: [u8; 3]| Vec3::from(color.map(|code| f32::from(code) / 255.0)));
@@ -95,13 +97,13 @@ fn heat(part: f32) -> Vec3 {
     colors[low].lerp(colors[low + 1], at - low as f32)
 }
 
-/// Least and largest error of the legend, of the mean light.
+/// Smallest and largest error of the legend, relative to the mean light.
 const RANGE: [f32; 2] = [0.002, 0.2];
 
-/// What the bake states of every texel's error, on the surfaces, with a legend.
+/// Draws the error that the bake states for every texel, on the surfaces, with a legend.
 fn sigma(gpu: &Gpu, model: &Path) -> Result<RgbImage, Box<dyn Error>> {
     let (mut world, report) = baked(model, false)?;
-    // A map holds E/π, and so do its errors.
+    // A map contains E/π, and its errors have the same unit.
     let mean = (report.mean_irradiance.iter().sum::<f64>() / 3.0 / std::f64::consts::PI) as f32;
     let part = |error: f32| (error / mean / RANGE[0]).ln() / (RANGE[1] / RANGE[0]).ln();
     let mut maps = world.query::<(&mut Lightmap, &TexelErrors, &mut Material)>();
@@ -111,7 +113,7 @@ fn sigma(gpu: &Gpu, model: &Path) -> Result<RgbImage, Box<dyn Error>> {
         map.image = Arc::new(LightmapImage { texels: texels.collect(), ..(*map.image).clone() });
         *material = Material::matt(Vec3::ONE);
     }
-    // A colour is the number that is shown.
+    // The displayed colour is the number itself.
     let options = FrameOptions { display: Display::Linear, exposure: Some(1.0), ..FrameOptions::default() };
     let drawn = frame(gpu, &mut world, &options)?;
     let mut picture = RgbImage::from_pixel(SIDE + 150, SIDE + STRIP, WHITE);

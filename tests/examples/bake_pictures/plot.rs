@@ -1,4 +1,4 @@
-//! Error against time, both in powers of ten, from the table that `error_against_time` prints. Not the measuring.
+//! Plots error against time, both on logarithmic axes, from the table that `error_against_time` prints.
 
 use image::{Rgb, RgbImage};
 
@@ -11,7 +11,7 @@ const GREY: Rgb<u8> = Rgb([222, 222, 222]);
 struct Row {
     scene: String,
     variant: String,
-    /// Of all processors: what others do on the machine hardly counts.
+    /// Summed over all processors, so that other load on the machine hardly matters.
     seconds: f64,
     stated: f64,
     found: f64,
@@ -27,7 +27,7 @@ fn rows(table: &str) -> Vec<Row> {
     table.lines().filter_map(row).collect()
 }
 
-/// From numbers to pixels.
+/// The mapping from numbers to pixels.
 struct Axes {
     left: f64,
     top: f64,
@@ -46,7 +46,7 @@ impl Axes {
     }
 }
 
-/// A power of ten, or two or five of them, beyond a number.
+/// Returns the nearest number above or below that is a power of ten times one, two or five.
 fn round(value: f64, up: bool) -> f64 {
     let mut steps = (-4..5).flat_map(|power| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(power)));
     if up {
@@ -86,13 +86,13 @@ fn square(picture: &mut RgbImage, [x, y]: [f64; 2], color: Rgb<u8>, full: bool) 
     }
 }
 
-/// Pixels for a name's dot before it and the gap after it.
+/// Pixels for the symbol before a name and the gap after it.
 const BESIDE_A_NAME: u32 = 36;
 
 const COLORS: [Rgb<u8>; 4] =
     [Rgb([20, 90, 180]), Rgb([215, 95, 15]), Rgb([30, 140, 60]), Rgb([140, 60, 150])];
 
-/// One panel for each scene, side by side.
+/// Draws one panel for each scene, side by side.
 pub fn draw(table: &str) -> Option<RgbImage> {
     let rows = rows(table);
     let mut scenes: Vec<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
@@ -156,7 +156,7 @@ fn panel_of(picture: &mut RgbImage, left: f64, scene: &str, rows: &[&Row]) {
             own.windows(2).for_each(|pair| line(picture, at(pair[0]), at(pair[1]), color, dashed));
             own.iter().for_each(|row| square(picture, at(row), color, found));
         }
-        // Below, beside each other.
+        // The legend below, in a row.
         let before: u32 = variants[..place].iter().map(|before| dots::width(before) + BESIDE_A_NAME).sum();
         let [x, y] = [axes.left + f64::from(before) - 60.0, bottom + 62.0];
         square(picture, [x, y], color, true);

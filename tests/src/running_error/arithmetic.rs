@@ -1,27 +1,29 @@
-//! Numbers with a bound on their error, and WGSL's accuracy of each operation (WGSL specification, section 15.7.4).
+//! Numbers with a bound on their error, and the accuracy that WGSL guarantees for each operation (WGSL
+//! specification, section 15.7.4).
 
-/// Half a unit in the last place of 1: the relative error of one rounding to f32.
+/// Half a unit in the last place of 1, which is the relative error of one rounding to f32.
 const ROUNDING: f64 = 5.960_464_477_539_063e-8;
-/// Results below the smallest normal number may be flushed to zero.
+/// The smallest normal number; smaller results may be flushed to zero.
 const FLUSHED: f64 = 1.175_494_350_822_287_5e-38;
 
-/// A real number and a bound on how far a device's f32 may be from it. Booleans are 0 and 1; a bound of 1 leaves them open.
+/// A real number and a bound on how much a device's f32 may differ from it. Booleans are 0 and 1; a bound of 1
+/// means undecided.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Number {
-    /// What exact arithmetic gives.
+    /// The result of exact arithmetic.
     pub value: f64,
-    /// The device's number is within this of it.
+    /// The device's number differs from it by at most this.
     pub error: f64,
 }
 
 impl Number {
-    /// A number that the device has exactly; one below the normal numbers it may take for zero.
+    /// A number that the device has exactly, unless it is below the normal numbers and may be flushed to zero.
     pub fn exact(value: f64) -> Self {
         let error = if value.abs() < FLUSHED { value.abs() } else { 0.0 };
         Self { value, error }
     }
 
-    /// A constant of the source: rounded to f32, unless it has few binary digits.
+    /// A constant of the source, which is rounded to f32 unless it has few binary digits.
     pub(super) fn constant(value: f32) -> Self {
         let rounded = value.to_bits() & 0xff != 0;
         Self { value: value.into(), error: if rounded { ROUNDING * f64::from(value.abs()) } else { 0.0 } }
@@ -31,7 +33,7 @@ impl Number {
         Self { value: f64::from(u8::from(value)), error: f64::from(u8::from(open)) }
     }
 
-    /// `value` with a propagated error and an own one of so many roundings.
+    /// Creates `value` with a propagated error and this many roundings of its own.
     fn rounded(value: f64, propagated: f64, roundings: f64) -> Self {
         let size = value.abs() + propagated;
         let error = propagated + roundings * ROUNDING * size + FLUSHED;
@@ -90,11 +92,11 @@ impl Number {
     fn product_error(self, other: Self) -> f64 {
         let terms =
             [self.value.abs() * other.error, self.error * other.value.abs(), self.error * other.error];
-        // 0 times an unbounded error is still 0.
+        // A product of 0 and an unbounded error is NaN here and counts as unbounded.
         terms.iter().map(|term| if term.is_nan() { f64::INFINITY } else { *term }).sum()
     }
 
-    /// 2.5 units in the last place, for divisors whose reciprocal is a normal number.
+    /// Off by 2.5 units in the last place, for divisors whose reciprocal is a normal number.
     pub(super) fn divide(self, other: Self) -> Self {
         let value = self.value / other.value;
         let least = other.value.abs() - other.error;
@@ -118,7 +120,7 @@ impl Number {
         Self { value: self.value.max(other.value), error: self.error.max(other.error) }
     }
 
-    /// The sum of products, in any order, fused or not.
+    /// Returns the sum of products, in any order, fused or not.
     pub(super) fn dot(left: &[Self], right: &[Self]) -> Self {
         let pairs = || left.iter().copied().zip(right.iter().copied());
         let value = pairs().map(|(a, b)| a.value * b.value).sum();
@@ -127,7 +129,7 @@ impl Number {
         if size == 0.0 {
             return Self { value, error: 0.0 };
         }
-        // One rounding of each product and one fewer sum than there are terms.
+        // One rounding for each product, and one sum fewer than there are terms.
         let error = propagated + left.len() as f64 * (ROUNDING * size + FLUSHED);
         Self {
             value,
@@ -142,7 +144,7 @@ impl Number {
         Self::rounded(value, propagated, roundings)
     }
 
-    /// 2 units in the last place.
+    /// Off by 2 units in the last place.
     pub(super) fn inverse_square_root(self) -> Self {
         if self.low() < FLUSHED {
             return Self { value: self.value.max(FLUSHED).sqrt().recip(), error: f64::INFINITY };
@@ -150,7 +152,7 @@ impl Number {
         self.monotonic(|x| x.sqrt().recip(), 4.0)
     }
 
-    /// As 1/inverseSqrt: 4.5 units in the last place. Zero stays zero.
+    /// As 1/inverseSqrt: off by 4.5 units in the last place. Zero stays zero.
     pub(super) fn square_root(self) -> Self {
         if self == Self::exact(0.0) {
             return self;
@@ -158,7 +160,7 @@ impl Number {
         self.monotonic(|x| x.max(0.0).sqrt(), 9.0)
     }
 
-    /// 3 + 2 |x| units in the last place.
+    /// Off by 3 + 2 |x| units in the last place.
     pub(super) fn exponential(self) -> Self {
         self.monotonic(f64::exp, 2.0 * (3.0 + 2.0 * (self.value.abs() + self.error)))
     }
@@ -167,7 +169,7 @@ impl Number {
         self.monotonic(f64::exp2, 2.0 * (3.0 + 2.0 * (self.value.abs() + self.error)))
     }
 
-    /// 2^-21 in [1/2, 2], else 3 units in the last place.
+    /// Off by 2^-21 in [1/2, 2], otherwise by 3 units in the last place.
     pub(super) fn logarithm_2(self) -> Self {
         if self.low() < FLUSHED {
             return Self { value: self.value.max(FLUSHED).log2(), error: f64::INFINITY };
@@ -186,12 +188,12 @@ impl Number {
         result
     }
 
-    /// exp2(y log2(x)), as the specification has it.
+    /// exp2(y log2(x)), as in the specification.
     pub(super) fn power(self, exponent: Self) -> Self {
         exponent.multiply(self.logarithm_2()).exponential_2()
     }
 
-    /// 4096 units in the last place.
+    /// Off by 4096 units in the last place.
     pub(super) fn arc_tangent_2(self, x: Self) -> Self {
         let value = self.value.atan2(x.value);
         let distance = self.value.hypot(x.value) - self.error.hypot(x.error);
@@ -200,7 +202,7 @@ impl Number {
         Self::rounded(value, propagated, 8192.0)
     }
 
-    /// Whether `self < other` (or `<=`); open where the errors overlap.
+    /// Returns whether `self < other` (or `<=`), undecided if the errors overlap.
     pub(super) fn less(self, other: Self, or_equal: bool) -> Self {
         let value = if or_equal { self.value <= other.value } else { self.value < other.value };
         let certain = self.high() < other.low() || other.high() < self.low();
@@ -214,7 +216,7 @@ impl Number {
         Self::boolean(self.value == other.value, !(apart || exact))
     }
 
-    /// What covers both of two ways, with the value of the first.
+    /// Returns a number that covers the results of both branches, with the value of the first.
     pub(super) fn hull(self, other: Self) -> Self {
         let error = self.error.max((other.value - self.value).abs() + other.error);
         Self { value: self.value, error: if error.is_nan() { f64::INFINITY } else { error } }

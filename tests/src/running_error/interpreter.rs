@@ -1,4 +1,5 @@
-//! The interpreter of naga's IR over numbers with error bounds. It knows what lighting functions are made of: no textures, no atomics.
+//! Interprets naga's IR over numbers with error bounds. It supports what lighting functions use: no textures and no
+//! atomics.
 
 use std::collections::HashMap;
 
@@ -11,12 +12,12 @@ use smallvec::{SmallVec, smallvec};
 
 use super::Number;
 
-/// The scalars of a value: few, and made often.
+/// The scalars of a value, which are few and created often.
 type Scalars = SmallVec<[Number; 4]>;
 
-/// Ways through the program that are followed at most, where conditions are open.
+/// Largest number of additional paths through the program that are followed where conditions are undecided.
 const MOST_WAYS: usize = 64;
-/// Rounds of a loop at most.
+/// Largest number of iterations of a loop.
 const MOST_ROUNDS: usize = 4096;
 
 /// A compiled kernel whose `evaluate` can be interpreted.
@@ -27,18 +28,18 @@ pub struct Program {
     functions: HashMap<Handle<Function>, Frame>,
 }
 
-/// What an input gives.
+/// The result of interpreting the program for one input.
 #[derive(Clone, Debug)]
 pub struct Bounds {
-    /// Exact values of the program, and how far a device may be off.
+    /// Exact results of the program, and how much a device may differ from them.
     pub results: Vec<Number>,
-    /// Ways followed beyond the first: branches that rounding decides.
+    /// Number of paths followed in addition to the first, due to branches that rounding decides.
     pub open_ways: usize,
     /// Whether rounding decides between two values of a `select`.
     pub open_selects: bool,
 }
 
-/// Where the values of a function's expressions and variables lie.
+/// Where the values of a function's expressions and variables are stored.
 #[derive(Debug)]
 struct Frame {
     expressions: Vec<(usize, usize)>,
@@ -53,12 +54,12 @@ enum Flow {
     Return(Scalars),
 }
 
-/// The answers to open conditions, in the order in which they are met.
+/// The decisions taken at undecided conditions, in the order in which these are reached.
 #[derive(Default)]
 struct Ways {
     answers: Vec<bool>,
     met: usize,
-    /// Whether a `select` was open between values that differ by more than their errors.
+    /// Whether a `select` was undecided between values that differ by more than their errors.
     selects: bool,
 }
 
@@ -66,7 +67,7 @@ impl Program {
     /// Reads a program in WGSL.
     ///
     /// # Panics
-    /// If it is not valid or has no `evaluate`.
+    /// If it is not valid or has no function `evaluate`.
     pub fn new(wgsl: &str) -> Self {
         let module = naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|error| panic!("{error}"));
         let mut validator =
@@ -85,12 +86,12 @@ impl Program {
         Self { evaluate: evaluate.expect("kernels have an evaluate function"), module, functions }
     }
 
-    /// The value of `evaluate` at `x`, with bounds.
+    /// Returns the value of `evaluate` for `x`, with bounds.
     pub fn bounds(&self, x: &[f32]) -> Bounds {
         let arguments: Scalars = x.iter().map(|x| Number::exact((*x).into())).collect();
         let mut ways = Ways::default();
         let mut results = self.call(self.evaluate, std::slice::from_ref(&arguments), &mut ways);
-        // Every way that differs from the first in one answer or more.
+        // All paths that differ from the first in at least one decision.
         let mut pending: Vec<Vec<bool>> = flipped(&ways.answers, 0);
         let (mut open_ways, mut open_selects) = (0, ways.selects);
         while let Some(answers) = pending.pop() {
@@ -130,7 +131,7 @@ impl Program {
     }
 }
 
-/// The prefixes that take the other way at one of the answers from `first` on.
+/// Returns the prefixes that take the other branch at one of the decisions from `first` on.
 fn flipped(answers: &[bool], first: usize) -> Vec<Vec<bool>> {
     (first..answers.len()).map(|at| answers[..at].iter().copied().chain([!answers[at]]).collect()).collect()
 }
@@ -158,7 +159,7 @@ impl Frame {
     }
 }
 
-/// Scalars that a type is made of.
+/// Returns the number of scalars in a type.
 fn scalars(module: &Module, inner: &TypeInner) -> usize {
     match inner {
         TypeInner::Scalar(_) => 1,
@@ -179,7 +180,7 @@ struct Run<'a> {
     frame: &'a Frame,
     numbers: Vec<Number>,
     arguments: &'a [Scalars],
-    /// Whether the errors left the condition of a `select` open.
+    /// Whether the errors left the condition of a `select` undecided.
     open: std::cell::Cell<bool>,
 }
 
@@ -253,7 +254,7 @@ impl Run<'_> {
         }
     }
 
-    /// The value of an expression: computed where it needs no emission, else as kept.
+    /// Returns the value of an expression: computed if it needs no emission, otherwise as stored.
     fn read(&self, handle: Handle<Expression>) -> Scalars {
         match self.function.expressions[handle] {
             Expression::Literal(_)
@@ -264,7 +265,7 @@ impl Run<'_> {
         }
     }
 
-    /// The place of a variable or a part of one.
+    /// Returns the storage of a variable or of a part of one.
     fn pointer(&self, handle: Handle<Expression>) -> (usize, usize) {
         match &self.function.expressions[handle] {
             Expression::LocalVariable(local) => self.frame.locals[local.index()],
@@ -300,7 +301,7 @@ impl Run<'_> {
         }
     }
 
-    /// Offset and length in scalars of a part of a composite.
+    /// Returns offset and length, in scalars, of a part of a composite.
     fn part(&self, inner: &TypeInner, index: usize) -> (usize, usize) {
         let module = &self.program.module;
         match inner {
@@ -317,7 +318,7 @@ impl Run<'_> {
         }
     }
 
-    /// The type of a composite value, as far as accesses need it.
+    /// Returns the type of a composite value, as far as accesses need it.
     fn value_type(&self, handle: Handle<Expression>) -> &TypeInner {
         let module = &self.program.module;
         match &self.function.expressions[handle] {
@@ -335,7 +336,7 @@ impl Run<'_> {
                 TypeInner::Array { base, .. } => &module.types[*base].inner,
                 other => other,
             },
-            // All that is left are vectors, whose parts are single numbers.
+            // Everything else is a vector, whose parts are single numbers.
             _ => &TypeInner::Vector { size: naga::VectorSize::Quad, scalar: naga::Scalar::F32 },
         }
     }

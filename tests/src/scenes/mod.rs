@@ -1,4 +1,4 @@
-//! Small scenes made in code: one subject, one light, one camera.
+//! Small scenes made in code: one object, one light, one camera.
 
 pub mod documents;
 
@@ -10,12 +10,13 @@ use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{Light, Material, SpotCone, Surface};
 use lumbre_scene::{Camera, Mesh, SceneSettings, Transform};
 
-/// A shiny ball of table 1.1 (990 polygons, 497 vertices) in front of a camera, lit by `light` from the upper right.
+/// A shiny ball of table 1.1 (990 polygons, 497 vertices) in front of a camera, lit by `light` from the upper
+/// right.
 pub fn ball(light: Light) -> World {
     ball_of(shapes::uv_sphere(1.0, 33, 16), light)
 }
 
-/// As [`ball`], of another mesh.
+/// The same as [`ball`] with another mesh.
 pub fn ball_of(mesh: TriangleMesh, light: Light) -> World {
     let mut world = World::new();
     let front = Surface {
@@ -33,7 +34,7 @@ pub fn ball_of(mesh: TriangleMesh, light: Light) -> World {
     world
 }
 
-/// Every kind of light, named, about as bright as each other on the ball.
+/// Every kind of light with its name, all about equally bright on the ball.
 pub fn every_light() -> Vec<(&'static str, Light)> {
     let color = Vec3::new(0.9, 0.8, 0.7);
     let with_ambient = |light: Light| Light { ambient: Vec3::splat(0.05), ..light };

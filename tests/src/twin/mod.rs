@@ -1,6 +1,7 @@
-//! The f64 twin of a frame: the same scene rasterized and shaded on the CPU with `lumbre_optics`, pixel centres exactly, no
-//! multisampling, no textures but lightmaps, normal maps and occlusion textures (first level only), no transparency, one irradiance volume at
-//! most. It shares no code with the renderer but the components.
+//! The f64 twin of a frame: the same scene rasterized and shaded on the CPU with `lumbre_optics`, exactly at pixel
+//! centres. It has no multisampling, no textures except lightmaps, normal maps and occlusion textures (first level
+//! only), no transparency, and at most one irradiance volume. It shares no code with the renderer except the
+//! components.
 
 mod raster;
 mod scene;
@@ -13,34 +14,34 @@ use lumbre_optics::{FlatRule, ReflectionModel, Shading};
 
 pub use raster::{draw, reflected_by_corner, reflected_by_pixel};
 
-/// A frame of the twin.
+/// A frame drawn by the twin.
 pub struct TwinFrame {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Radiance, top row first; the background where no surface is.
+    /// Radiance, top row first; the background's where there is no surface.
     pub color: Vec<DVec3>,
-    /// What each pixel shows: object and triangle, or `None` for the background.
+    /// Index of the object and triangle that each pixel shows, or `None` for the background.
     pub surface: Vec<Option<(usize, usize)>>,
 }
 
-/// Choices of the twin, as the renderer's.
+/// Options of the twin, like those of the renderer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TwinOptions {
-    /// Instead of each object's own.
+    /// Overrides each object's own shading.
     pub shading: Option<Shading>,
-    /// Instead of the scene's.
+    /// Overrides the scene's reflection model.
     pub reflection: Option<ReflectionModel>,
-    /// Instead of the scene's.
+    /// Overrides the scene's flat rule.
     pub flat_rule: Option<FlatRule>,
-    /// Instead of the scene's.
+    /// Overrides the scene's specular antialiasing.
     pub specular_antialiasing: Option<bool>,
 }
 
 impl TwinFrame {
-    /// The pixels whose whole 3x3 neighbourhood shows one surface, or for flat shading one triangle: there no rounding of
-    /// coverage can show another.
+    /// Returns the pixels whose whole 3x3 neighbourhood shows one surface (for flat shading, one triangle), so that
+    /// no rounding of coverage can show another one there.
     pub fn interior(&self, one_triangle: bool) -> Vec<Option<DVec3>> {
         let key = |x: usize, y: usize| {
             self.surface[y * self.width + x]
@@ -58,7 +59,7 @@ impl TwinFrame {
             .collect()
     }
 
-    /// As [`interior`](Self::interior), without the background: that agrees too easily to be counted.
+    /// The same as [`interior`](Self::interior) without the background, which agrees too easily to be counted.
     pub fn inside_surfaces(&self, one_triangle: bool) -> Vec<Option<DVec3>> {
         let interior = self.interior(one_triangle);
         interior

@@ -1,4 +1,4 @@
-//! The twin's rasterizer: pixel centres, exactly, nearest surface first.
+//! The twin's rasterizer: exactly at pixel centres, with the nearest surface visible.
 
 use bevy_ecs::prelude::*;
 use glam::{DMat3, DVec2, DVec3};
@@ -15,7 +15,7 @@ use super::{TwinFrame, TwinOptions};
 /// Draws `world` from its first camera.
 ///
 /// # Panics
-/// Without a perspective camera: the tests' scenes have one.
+/// If that is not a perspective camera.
 pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions) -> TwinFrame {
     let view = View::new(world, width, height, options);
     let surface = view.surfaces();
@@ -24,7 +24,7 @@ pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions
         let seen = SeenTriangle::new(&view.lens, triangle)?;
         let (x, y) = (at % width, at / width);
         let shaded = ShadedTriangle::new(&view.scene, object, triangle, seen.front);
-        // The neighbours of the two-by-two block that fine derivatives are taken in.
+        // The neighbours within the two-by-two block in which fine derivatives are taken.
         let (left, top) = (x & !1, y & !1);
         let pixel = PixelWeights {
             center: seen.weights(center(x, y)),
@@ -42,8 +42,9 @@ pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions
     TwinFrame { width, height, color, surface }
 }
 
-/// What every light that is no ambient one reflects towards the camera, by pixel of `world`'s first camera: the brightest channel of each light, nothing where no surface is seen.
-/// For surfaces without textures, under Phong shading.
+/// Returns how much every light except ambient ones reflects towards `world`'s first camera, per pixel: the
+/// brightest channel of each light, and nothing where there is no surface. For surfaces without textures, under
+/// Phong shading.
 ///
 /// # Panics
 /// As [`draw`].
@@ -64,7 +65,8 @@ pub fn reflected_by_pixel(
     view.surfaces().iter().enumerate().map(|pixel| of_pixel(pixel).unwrap_or_default()).collect()
 }
 
-/// The same by corner of every triangle, seen or not: where flat and Gouraud shading evaluate lights. Each triangle shows its front.
+/// Returns the same per corner of every triangle, visible or not, where flat and Gouraud shading evaluate lights.
+/// Each triangle shows its front.
 ///
 /// # Panics
 /// As [`draw`].
@@ -79,7 +81,7 @@ pub fn reflected_by_corner(world: &mut World, options: TwinOptions) -> Vec<Vec<f
         .collect()
 }
 
-/// A World from its first camera.
+/// A world as its first camera sees it.
 struct View {
     scene: Scene,
     objects: Vec<Object>,
@@ -119,7 +121,7 @@ impl View {
         Self { scene, objects, lens }
     }
 
-    /// The object and triangle that each pixel shows.
+    /// Returns the object and triangle that each pixel shows.
     fn surfaces(&self) -> Vec<Option<(usize, usize)>> {
         let (width, height) = (self.lens.size.x as usize, self.lens.size.y as usize);
         let mut surface = vec![None; width * height];
@@ -152,19 +154,19 @@ fn center(x: usize, y: usize) -> DVec2 {
     DVec2::new(x as f64 + 0.5, y as f64 + 0.5)
 }
 
-/// How the camera sees.
+/// The parameters of the camera.
 struct Lens {
     focal: f64,
     near: f64,
-    /// Of the frame, in pixels.
+    /// Size of the frame in pixels.
     size: DVec2,
     to_view: DMat3,
     eye: DVec3,
 }
 
-/// A triangle in the frame.
+/// A triangle projected into the frame.
 struct SeenTriangle {
-    /// Corners in pixels, rows running down.
+    /// Corners in pixels, with y pointing down.
     pixel: [DVec2; 3],
     /// Distances along the view axis, in metres.
     depth: [f64; 3],
@@ -174,7 +176,8 @@ struct SeenTriangle {
 }
 
 impl SeenTriangle {
-    /// Nothing for a triangle without area and for one that crosses the near plane: the tests' scenes have none of those.
+    /// Returns `None` for a triangle without area, and for one that crosses the near plane, which the tests' scenes
+    /// do not have.
     fn new(lens: &Lens, triangle: &[Vertex; 3]) -> Option<Self> {
         let view = triangle.each_ref().map(|vertex| lens.to_view * (vertex.point - lens.eye));
         if view.iter().any(|v| -v.z < lens.near) {
@@ -186,11 +189,12 @@ impl SeenTriangle {
             DVec2::new((x + 1.0) * 0.5, (1.0 - y) * 0.5) * lens.size
         });
         let area = (pixel[1] - pixel[0]).perp_dot(pixel[2] - pixel[0]);
-        // Pixel rows run down, so that counter-clockwise in the world is negative here.
+        // With y pointing down, counter-clockwise in the world is a negative area here.
         (area != 0.0).then(|| Self { pixel, depth: view.map(|v| -v.z), area, front: area < 0.0 })
     }
 
-    /// Weights on the screen, each divided by its corner's distance: what perspective interpolates with.
+    /// Returns the screen-space weights, each divided by its corner's distance, for perspective-correct
+    /// interpolation.
     fn weighted(&self, center: DVec2) -> [f64; 3] {
         let edge =
             |a: usize, b: usize| (self.pixel[b] - self.pixel[a]).perp_dot(center - self.pixel[a]) / self.area;
@@ -203,7 +207,7 @@ impl SeenTriangle {
         weighted.iter().all(|weight| *weight >= 0.0).then(|| 1.0 / weighted.iter().sum::<f64>())
     }
 
-    /// Perspective-correct weights of the corners, outside of the triangle too.
+    /// Returns the perspective-correct weights of the corners, also outside the triangle.
     fn weights(&self, center: DVec2) -> [f64; 3] {
         let weighted = self.weighted(center);
         let sum: f64 = weighted.iter().sum();

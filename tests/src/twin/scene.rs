@@ -1,4 +1,4 @@
-//! What the twin draws: the components of a World in world space, f64.
+//! What the twin draws: the components of a world, in world space and f64.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use super::volume::Volume;
 pub(super) struct Vertex {
     pub(super) point: DVec3,
     pub(super) normal: DVec3,
-    /// Direction in the world, and its side there.
+    /// Direction in world space, and its handedness there.
     pub(super) tangent: DVec4,
     pub(super) uv: [DVec2; 2],
 }
@@ -33,12 +33,12 @@ pub(super) struct Scene {
     pub(super) basis: DMat3,
 }
 
-/// A triangle of an emissive object that lights others.
+/// A triangle or parallelogram of an emissive object that lights others.
 pub(super) struct Polygon {
     pub(super) light: PolygonLight,
     /// Index of the object whose triangle it is.
     pub(super) emitter: usize,
-    /// A lightmap has its diffuse light.
+    /// Whether a lightmap contains its diffuse light.
     pub(super) baked: bool,
 }
 
@@ -51,15 +51,15 @@ pub(super) struct Object {
     pub(super) normal_map: Option<NormalTexture>,
     pub(super) occlusion: Option<OcclusionTexture>,
     pub(super) triangles: Vec<[Vertex; 3]>,
-    /// Its transform mirrors: the second and third corner of every triangle have changed places.
+    /// Whether its transform mirrors it, in which case the second and third corner of every triangle are swapped.
     pub(super) mirrored: bool,
-    /// Its faces light others: whether they are baked.
+    /// If its faces light others, whether they are baked.
     pub(super) emissive_light: Option<bool>,
 }
 
 impl Object {
-    /// Its faces as lights, without a texture. Two triangles make one polygon if they follow each other and halve a parallelogram: the
-    /// tests' lamps are made so.
+    /// Returns its faces as lights, without textures. Two consecutive triangles make one polygon if they are halves
+    /// of a parallelogram, as in the tests' lamps.
     pub(super) fn polygons(&self) -> Vec<Polygon> {
         let Some(baked) = self.emissive_light else { return Vec::new() };
         let [front, back] = EmissiveLight::radiance(&self.material).map(|color| color.as_dvec3());
@@ -93,7 +93,7 @@ type Choices<'a> = (Option<&'a Shading>, Option<&'a ReflectionModel>);
 type Found<'a> = (&'a Mesh, &'a Material, &'a GlobalTransform, Choices<'a>, Maps<'a>, (bool, bool));
 type Maps<'a> = (Option<&'a Lightmap>, Option<&'a MaterialTextures>);
 
-/// The objects that are seen.
+/// Returns the visible objects.
 pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &TwinOptions) -> Vec<Object> {
     let mut query = world.query_filtered::<(
         &Mesh,
@@ -108,7 +108,7 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
         let (normal_map, occlusion) =
             textures.map_or((None, None), |textures| (textures.normal.clone(), textures.occlusion.clone()));
         let mesh = with_tangents(&mesh.0, normal_map.as_ref());
-        // Of unit size, so that what counts as no normal does not depend on the scale.
+        // Scaled to unit size, so that the threshold for a missing normal does not depend on the scale.
         let normals = place.normal_matrix();
         let largest = normals.to_cols_array().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let normals = if largest > 0.0 { normals * (1.0 / largest) } else { normals };
@@ -139,7 +139,7 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
             triangles: mesh
                 .triangles()
                 .map(|triangle| {
-                    // A mirrored triangle winds the other way; its front stays its front.
+                    // A mirrored triangle has the opposite winding; its front stays its front.
                     let [a, b, c] = triangle.map(vertex);
                     if place.mirrors() { [a, c, b] } else { [a, b, c] }
                 })
@@ -149,7 +149,7 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
     query.iter(world).enumerate().map(object).collect()
 }
 
-/// The mesh as its normal map needs it.
+/// Returns the mesh with the tangents that its normal map needs.
 fn with_tangents(mesh: &Arc<TriangleMesh>, map: Option<&NormalTexture>) -> Arc<TriangleMesh> {
     let Some(map) = map.filter(|_| mesh.tangents.is_empty()) else { return Arc::clone(mesh) };
     let set = match map.texture.tex_coord {

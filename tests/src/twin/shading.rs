@@ -1,4 +1,4 @@
-//! The twin's shading: once per polygon, per vertex or per pixel, with the f64 equations of `lumbre_optics`.
+//! The twin's shading, per polygon, per vertex or per pixel, with the f64 equations of `lumbre_optics`.
 
 use super::scene::{Object, Scene, Vertex};
 use super::texture::{sample, sample_lightmap, transform};
@@ -17,20 +17,20 @@ pub(super) struct PixelWeights {
     pub down: [[f64; 3]; 2],
 }
 
-/// Light that a texture occludes, and light that it does not.
+/// The light that an occlusion texture affects, and the light that it does not.
 #[derive(Clone, Copy)]
 struct Lit {
     ambient: DVec3,
     direct: DVec3,
 }
 
-/// A triangle with what is computed once of it.
+/// A triangle with what is computed once for it.
 pub(super) struct ShadedTriangle<'a> {
     scene: &'a Scene,
     object: &'a Object,
     triangle: &'a [Vertex; 3],
     front: bool,
-    /// Of the vertices (Gouraud) or of the face (flat, three times the same).
+    /// Colours of the vertices (Gouraud) or of the face (flat, three times the same).
     colors: Option<[Lit; 3]>,
 }
 
@@ -39,7 +39,7 @@ impl<'a> ShadedTriangle<'a> {
         let mut shaded = Self { scene, object, triangle, front, colors: None };
         let [a, b, c] = triangle.each_ref().map(|vertex| vertex.point);
         shaded.colors = match object.shading {
-            // The twin knows no need: it is what shading by need may not be far from.
+            // The twin always uses Phong shading here, which is the reference for shading by need.
             Shading::Phong | Shading::Auto { .. } => None,
             Shading::Gouraud => {
                 Some(triangle.each_ref().map(|v| shaded.lit(v.point, shaded.facing(v.normal), 0.0)))
@@ -110,17 +110,17 @@ impl<'a> ShadedTriangle<'a> {
         }
     }
 
-    /// Back faces are lit as such only where two-sided lighting is on.
+    /// Back faces are only lit as such if two-sided lighting is on.
     fn lit_as_front(&self) -> bool {
         self.front || !(self.object.material.double_sided && self.scene.settings.two_sided)
     }
 
-    /// A normal of the front, on the side that is lit.
+    /// Returns a normal of the front, turned to the side that is lit.
     fn facing(&self, normal: DVec3) -> DVec3 {
         facing_normal(normal, self.lit_as_front())
     }
 
-    /// `widening` of the highlight: 0 for none.
+    /// `widening` is that of the highlight, 0 for none.
     fn lit(&self, point: DVec3, normal: DVec3, widening: f64) -> Lit {
         let scene = self.scene;
         let front = self.lit_as_front();
@@ -154,7 +154,8 @@ impl<'a> ShadedTriangle<'a> {
         Lit { ambient, direct: add_emission(direct.total(), side.emission.as_dvec3()) }
     }
 
-    /// What each light adds at a point, and whether it is one that frames evaluate there: not an ambient one, and not one that is off.
+    /// Returns what each light adds at a point, and whether frames evaluate it there, which they do not for ambient
+    /// lights and lights that are off.
     fn contributions(
         &self,
         surface: SurfaceSample,
@@ -187,7 +188,8 @@ impl<'a> ShadedTriangle<'a> {
         of_lights.chain(of_polygons)
     }
 
-    /// The brightest channel of what each light that is evaluated adds at a pixel; for surfaces without textures, under Phong shading.
+    /// Returns the brightest channel of what each evaluated light adds at a pixel; for surfaces without textures,
+    /// under Phong shading.
     pub(super) fn reflected(&self, weights: [f64; 3]) -> Vec<f64> {
         let mix = |of: &dyn Fn(&Vertex) -> DVec3| -> DVec3 {
             (0..3).map(|i| of(&self.triangle[i]) * weights[i]).sum()
@@ -196,7 +198,7 @@ impl<'a> ShadedTriangle<'a> {
         self.reflected_at(mix(&|vertex| vertex.point), normal)
     }
 
-    /// The same at its corners, where flat and Gouraud shading evaluate it.
+    /// Returns the same at its corners, where flat and Gouraud shading evaluate it.
     pub(super) fn reflected_at_corners(&self) -> [Vec<f64>; 3] {
         let corners = self.triangle.each_ref().map(|vertex| vertex.point);
         let [a, b, c] = corners;

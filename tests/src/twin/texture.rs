@@ -1,17 +1,17 @@
-//! Textures as the twin samples them: the first level, filtered as magnified, in f64.
+//! Textures as the twin samples them: the first level with the magnification filter, in f64.
 
 use glam::{DVec2, DVec3, DVec4};
 use lumbre_scene::{LightmapImage, TextureReference, Wrap};
 
-/// The rows of a texture's transform: u' = row.(u, v, 1).
+/// Returns the rows of a texture's transform: u' = row.(u, v, 1).
 pub(super) fn transform(texture: &TextureReference) -> [DVec3; 2] {
     let (sin, cos) = f64::from(texture.rotation).sin_cos();
     let (scale, offset) = (texture.scale.as_dvec2(), texture.offset.as_dvec2());
-    // KHR_texture_transform: scaled, then rotated, then moved; v runs down.
+    // KHR_texture_transform: scale, then rotation, then offset; v increases downwards.
     [DVec3::new(cos * scale.x, sin * scale.y, offset.x), DVec3::new(-sin * scale.x, cos * scale.y, offset.y)]
 }
 
-/// The channels of a texture at coordinates of its set, 0 to 1.
+/// Returns the channels of a texture, 0 to 1, at coordinates of its set.
 pub(super) fn sample(texture: &TextureReference, uv: DVec2) -> DVec4 {
     let [u, v] = transform(texture).map(|row| row.dot(uv.extend(1.0)));
     let image = &texture.image;
@@ -38,7 +38,7 @@ pub(super) fn sample(texture: &TextureReference, uv: DVec2) -> DVec4 {
     texel(x, y).lerp(texel(x + 1, y), part.x).lerp(texel(x, y + 1).lerp(texel(x + 1, y + 1), part.x), part.y)
 }
 
-/// A lightmap: bilinear, clamped to the edge.
+/// Samples a lightmap: bilinear, clamped to the edge.
 pub(super) fn sample_lightmap(image: &LightmapImage, uv: DVec2) -> DVec3 {
     let (width, height) = (image.width as i64, image.height as i64);
     let at = uv * DVec2::new(width as f64, height as f64) - 0.5;

@@ -1,4 +1,4 @@
-//! The light of an irradiance volume, as its documentation has it: read probe by probe.
+//! The light of an irradiance volume as its documentation defines it, computed probe by probe.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec3};
@@ -6,13 +6,13 @@ use lumbre_scene::{GlobalTransform, IrradianceVolume};
 
 pub(super) struct Volume {
     volume: IrradianceVolume,
-    /// The box in the world.
+    /// The box in world space.
     low: DVec3,
     size: DVec3,
 }
 
 impl Volume {
-    /// The only one of a World, in a place without rotation.
+    /// Returns the only volume of a world, whose transform must not rotate.
     pub(super) fn of(world: &mut World) -> Option<Self> {
         let mut query = world.query::<(&IrradianceVolume, &GlobalTransform)>();
         let (volume, place) = query.iter(world).next()?;
@@ -21,7 +21,7 @@ impl Volume {
         Some(Self { volume: volume.clone(), low: place.translation() - 0.5 * size, size })
     }
 
-    /// E/π for a surface with this normal.
+    /// Returns E/π for a surface with this normal.
     pub(super) fn light(&self, point: DVec3, normal: DVec3) -> DVec3 {
         let cells = self.volume.resolution.as_dvec3();
         let at = (point - self.low) / self.size * cells - 0.5;

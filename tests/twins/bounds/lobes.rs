@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::powers::{self, Off};
 use super::{Allowed, FLUSHED, Numbers, U, vectors};
 
-/// A vector and how far each of its components may be off.
+/// A vector and how much each of its components may be off.
 #[derive(Clone, Copy)]
 pub struct OffVector {
     pub value: DVec3,
@@ -18,8 +18,9 @@ impl OffVector {
     }
 }
 
-/// cosine_lobe: the cosine and the squared sine with their roundings and what the vectors bring along, then `power_of_cosine`.
-/// Without SHARP_HIGHLIGHTS the power of the cosine, which keeps the vectors' lengths: what the two forms differ by is added.
+/// cosine_lobe: the cosine and the squared sine with their roundings and the errors of the vectors, then
+/// `power_of_cosine`. Without SHARP_HIGHLIGHTS it is the power of the cosine, which depends on the vectors'
+/// lengths, so the difference between the two forms is added.
 pub fn cosine_lobe(axis: OffVector, direction: OffVector, exponent: Off, sharp: bool) -> f64 {
     let (a, b) = (axis.value, direction.value);
     let value = a.dot(b);
@@ -36,7 +37,7 @@ pub fn cosine_lobe(axis: OffVector, direction: OffVector, exponent: Off, sharp: 
     powers::power_of_cosine(cosine, Off { value: sine * sine, error: of_square }, exponent)
 }
 
-/// Either side of the gate n·l > 0, if n·l is within its rounding of 0.
+/// Accepts either side of the condition n·l > 0 if n·l is within its rounding of 0.
 fn gated(error: f64, normal: DVec3, light: DVec3, lobe: impl FnOnce() -> f64) -> Allowed {
     Allowed::from(error).or(vectors::is_open(normal, light), || {
         let other = if normal.dot(light) > 0.0 { 0.0 } else { lobe() };
@@ -44,7 +45,7 @@ fn gated(error: f64, normal: DVec3, light: DVec3, lobe: impl FnOnce() -> f64) ->
     })
 }
 
-/// phong: the lobe around a reflected direction that is off itself.
+/// phong: the lobe around a reflected direction that is itself off.
 pub fn phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, sharp: bool) -> Allowed {
     let value = lumbre_optics::reflected_direction(normal, light);
     let axis = OffVector { value, error: vectors::reflected_direction(normal, light) };
@@ -52,7 +53,7 @@ pub fn phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, sharp: 
     gated(error, normal, light, || lumbre_optics::cosine_lobe(value, viewer, shininess))
 }
 
-/// The half-vector lobe for an exponent that may be off: h is off by 9 u per component.
+/// The half-vector lobe for an exponent that may be off; h is off by 9 u per component.
 fn blinn(normal: DVec3, light: DVec3, viewer: DVec3, exponent: Off, sharp: bool) -> Allowed {
     let value = lumbre_optics::half_vector(light, viewer);
     let half = OffVector { value, error: vectors::normalized_sum(light + viewer) };
@@ -64,12 +65,12 @@ pub fn blinn_phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, s
     blinn(normal, light, viewer, Off::exact(shininess), sharp)
 }
 
-/// 4 n is exact.
+/// blinn_phong_4n: 4 n is exact.
 pub fn blinn_phong_4n(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, sharp: bool) -> Allowed {
     blinn(normal, light, viewer, Off::exact(4.0 * shininess), sharp)
 }
 
-/// 4 n cos θ_i has the cosine's error and a rounding.
+/// blinn_phong_matched: 4 n cos θ_i has the cosine's error and one rounding.
 pub fn blinn_phong_matched(
     normal: DVec3,
     light: DVec3,
@@ -82,7 +83,7 @@ pub fn blinn_phong_matched(
     blinn(normal, light, viewer, Off { value, error }, sharp)
 }
 
-/// phong_normalization: a sum.
+/// phong_normalization: u, for the sum.
 pub fn phong_normalization(shininess: f64) -> f64 {
     U * lumbre_optics::phong_normalization(shininess)
 }
@@ -96,7 +97,8 @@ pub fn blinn_phong_normalization(shininess: f64) -> f64 {
     lumbre_optics::blinn_phong_normalization(shininess) * relative
 }
 
-/// A bare lobe times its constant and n·l: the lobe's error and the cosine's times the rest, and two products.
+/// A plain lobe times its constant and n·l: the lobe's error and the cosine's error times the other factors, and
+/// two products.
 fn normalized(
     bare: Allowed,
     lobe: f64,
@@ -137,12 +139,12 @@ pub fn normalized_blinn_phong(
     normalized(bare, lobe, constant, cosine, vectors::dot(normal, light))
 }
 
-/// lobe_widening: two roundings; .18 is one too.
+/// lobe_widening: two roundings; the constant .18 is rounded once.
 pub fn lobe_widening(squared_change_x: f64, squared_change_y: f64) -> f64 {
     2.0 * U * lumbre_optics::lobe_widening(squared_change_x, squared_change_y) + FLUSHED
 }
 
-/// filtered_lobe: 15 u of the exponent and 16 u / scale, for the difference of α'² from 1; 20 u of the peak.
+/// filtered_lobe: 15 u of the exponent and 16 u / scale, because of the difference of α'² from 1; 20 u of the peak.
 pub fn filtered_lobe(shininess: f64, scale: f64, widening: f64) -> [f64; 2] {
     let lobe = lumbre_optics::filtered_lobe(shininess, scale, widening);
     [15.0 * U * lobe.shininess + 16.0 * U / scale + FLUSHED, 20.0 * U * lobe.peak]

@@ -6,7 +6,8 @@ use lumbre_optics::{self as optics, SHORTEST_BENT_SQUARED, TINY_LENGTH_SQUARED};
 use super::powers::Off;
 use super::{Allowed, FLUSHED, Numbers, U, microfacets, refraction, vectors};
 
-/// map_normal: the sum is off by 10 u of its terms by magnitudes, its direction by twice that over its length, and 8 u.
+/// map_normal: the sum is off by 10 u of its terms' magnitudes, its direction by twice that over its length, and by
+/// 8 u.
 pub fn map_normal(texel: DVec3, scale: f64, tangent: DVec4, normal: DVec3) -> Allowed {
     let slope = 2.0 * texel - DVec3::ONE;
     let along = tangent.truncate();
@@ -36,7 +37,8 @@ pub fn map_normal(texel: DVec3, scale: f64, tangent: DVec4, normal: DVec3) -> Al
     Allowed::from(error).or(open, || Numbers::from_slice(&optics::safe_normalize(other).to_array()))
 }
 
-/// transformed_tangent: 12 u of |T| + |N x T| by magnitudes; either side of a determinant within its rounding of 0.
+/// transformed_tangent: 12 u of the magnitudes of |T| + |N x T|; either sign where the determinant is within its
+/// rounding of 0.
 pub fn transformed_tangent(u: DVec3, v: DVec3, tangent: DVec4, normal: DVec3) -> Allowed {
     let along = tangent.truncate();
     let size = along.abs() + vectors::cross_size(normal, along) * tangent.w.abs();
@@ -57,23 +59,24 @@ pub fn occlusion(sample: f64, strength: f64) -> f64 {
     3.0 * U * (1.0 + 2.0 * strength.abs()) * (1.0 + sample.abs()) + FLUSHED
 }
 
-/// lobe_peak: a sum's u; the factor is a power of two.
+/// lobe_peak: u, for the sum; the factor is a power of two.
 pub fn lobe_peak(shininess: f64) -> f64 {
     U * optics::lobe_peak(shininess) + FLUSHED
 }
 
-/// distribution_ggx: q = A/(A + B), B = sin² (1 - A): (1 - q) times the relative errors of A and B, and 6 u; D = q². At both ends of what
-/// is off.
+/// distribution_ggx: for q = A/(A + B) with B = sin² (1 - A) it is (1 - q) times the relative errors of A and B,
+/// and 6 u; D = q². Evaluated at both ends of the arguments' errors.
 pub fn distribution_ggx(sine_squared: Off, alpha_squared: Off) -> f64 {
     let at = |sine: f64, alpha: f64| optics::distribution_ggx(sine.max(0.0), alpha.clamp(0.0, 1.0));
     let value = at(sine_squared.value, alpha_squared.value);
     let low = at(sine_squared.value + sine_squared.error, alpha_squared.value - alpha_squared.error);
     let high = at(sine_squared.value - sine_squared.error, alpha_squared.value + alpha_squared.error);
-    // 1 - A is off by u/(1 - A) of itself, which counts only where sin² times that is felt.
+    // 1 - A is off by u/(1 - A) relative, which only matters where it is multiplied by a large sin².
     (high - value).max(value - low) + 24.0 * U * high + FLUSHED
 }
 
-/// smith_attenuation: 24 u, and what its cosines and α² bring: it rises with n·l and falls with the other two.
+/// smith_attenuation: 24 u, and the effect of the errors of its cosines and α²: it increases with n·l and decreases
+/// with the other two.
 pub fn smith_attenuation(n_light: Off, n_viewer: Off, alpha_squared: Off) -> f64 {
     let at = |sign: f64| {
         optics::smith_attenuation(
@@ -87,7 +90,7 @@ pub fn smith_attenuation(n_light: Off, n_viewer: Off, alpha_squared: Off) -> f64
     (high - value).max(value - low) + 24.0 * U * high + 1e12 * FLUSHED
 }
 
-/// gltf_reflection: its three factors, each with the errors of what it is given, and 8 u.
+/// gltf_reflection: its three factors, each with the errors of its arguments, and 8 u.
 pub fn gltf_reflection(directions: [DVec3; 3], shininess: f64, specular: DVec3) -> Allowed {
     let [normal, light, viewer] = directions;
     let sum = light + viewer;
@@ -107,7 +110,7 @@ pub fn gltf_reflection(directions: [DVec3; 3], shininess: f64, specular: DVec3) 
     let of_fresnel = (at(v_half - of_v_half) - fresnel).abs().max((at(v_half + of_v_half) - fresnel).abs())
         + refraction::fresnel_schlick(v_half, specular);
     let peak = optics::lobe_peak(shininess);
-    // Beyond 1.3e5 it is held.
+    // The factor is clamped to 1.3e5.
     let lobe = (peak * density * geometry).min(1.3e5);
     let of_lobe = peak * (of_density * (geometry + of_geometry) + density * of_geometry) + 4.0 * U * lobe;
     let error = fresnel.abs() * of_lobe

@@ -1,4 +1,4 @@
-//! Bounds of the distributions of microfacets and of Blinn's model of 1977.
+//! Bounds of the microfacet distributions and of Blinn's model of 1977.
 
 use std::f64::consts::{LN_2, SQRT_2};
 
@@ -13,7 +13,8 @@ pub fn quarter_angle(sine: f64, cosine: f64) -> f64 {
     9.0 * U * optics::quarter_angle(sine, cosine) + 2.0 * FLUSHED * (1.0 + 1.0 / sine.max(cosine).max(1e-30))
 }
 
-/// one_minus_exp: the series' 7 u and 10⁻⁸ up to 1/4; beyond, exp's error and a rounding. Both where x is within its error of 1/4.
+/// one_minus_exp: the series' 7 u and 10⁻⁸ up to 1/4; beyond that exp's error and a rounding. Both apply where x is
+/// within its error of 1/4.
 pub fn one_minus_exp(x: Off) -> f64 {
     let value = -(-x.value).exp_m1();
     let series = value * (7.0 * U + 1e-8);
@@ -31,12 +32,12 @@ pub fn one_minus_exp(x: Off) -> f64 {
 /// half_value_sine_squared: 2 ln 2/n is off by 7 u.
 pub fn half_value_sine_squared(shininess: f64) -> f64 {
     let x = 2.0 * LN_2 / shininess.max(1e-6);
-    // Beyond 80 the exponential is held.
+    // Beyond 80 the exponential is clamped.
     one_minus_exp(Off { value: x, error: 7.0 * U * x.min(80.0) })
 }
 
-/// half_value_angle: the tangent by the sine's relative error (half of its square's, and a root's 9 u) and the cosine's (exp, and
-/// 7 u of its exponent); the angle by sin cos of that, and 9 u.
+/// half_value_angle: the tangent is off by the relative errors of the sine (half of its square's, and a root's 9 u)
+/// and of the cosine (exp, and 7 u of its exponent); the angle by sin cos times that, and 9 u.
 pub fn half_value_angle(shininess: f64) -> f64 {
     let square = optics::half_value_sine_squared(shininess);
     let x = (LN_2 / shininess.max(1e-6)).min(80.0);
@@ -46,8 +47,8 @@ pub fn half_value_angle(shininess: f64) -> f64 {
     slope * (of_sine + of_cosine) + 9.0 * U * optics::half_value_angle(shininess) + 2.0 * FLUSHED
 }
 
-/// distribution_gaussian: the angle's and the half-value angle's errors twice, and 4 u, of the exponent; exp. The cosine and the
-/// squared sine may be off themselves, which moves the angle from one end to the other.
+/// distribution_gaussian: the exponent is off by twice the errors of the angle and the half-value angle, and 4 u;
+/// then exp. The cosine and the squared sine may be off themselves, which moves the angle between two ends.
 pub fn distribution_gaussian(cosine: Off, sine_squared: Off, shininess: f64) -> f64 {
     let angle_of =
         |square: f64, cosine: f64| optics::quarter_angle(square.max(0.0).sqrt(), cosine.clamp(0.0, 1.0));
@@ -55,7 +56,7 @@ pub fn distribution_gaussian(cosine: Off, sine_squared: Off, shininess: f64) -> 
     let of_square = sine_squared.error + FLUSHED;
     let wide = angle_of(sine_squared.value + of_square, cosine.value - cosine.error);
     let narrow = angle_of(sine_squared.value - of_square, cosine.value + cosine.error);
-    // The root's 9 u turn the angle by sin cos of that; the angle's own 9 u.
+    // The root's 9 u change the angle by sin cos times that; the angle has 9 u of its own.
     let own = 9.0 * U * (angle + angle.sin() * angle.cos()) + 2.0 * FLUSHED;
     let beta = optics::half_value_angle(shininess).max(1e-6);
     let of_beta = half_value_angle(shininess) / beta;
@@ -72,13 +73,13 @@ pub fn distribution_gaussian(cosine: Off, sine_squared: Off, shininess: f64) -> 
     (high - value).max(value - low) + roundings(angle).max(roundings(narrow)) + FLUSHED
 }
 
-/// distribution_trowbridge_reitz: q = A/(A + B), A = c₃², B = sin² (1 - A), off by q (1 - q) times the relative errors of A and B, and
-/// 6 u; D = q². The squared sine may be off itself.
+/// distribution_trowbridge_reitz: q = A/(A + B), A = c₃², B = sin² (1 - A), is off by q (1 - q) times the relative
+/// errors of A and B, and 6 u; D = q². The squared sine may be off itself.
 pub fn distribution_trowbridge_reitz(sine_squared: Off, shininess: f64) -> f64 {
     let half_value = optics::half_value_sine_squared(shininess);
     let of_half_value = half_value_sine_squared(shininess) / half_value;
     let a = half_value / (SQRT_2 - 1.0 + half_value);
-    // A is flat in the half value: by (1 - A) of its relative error.
+    // A depends little on the half value: it is off by (1 - A) times the half value's relative error.
     let of_a = (1.0 - a) * of_half_value + 8.0 * U;
     let s = sine_squared.value.clamp(0.0, 1.0);
     let b = s * (1.0 - a);
@@ -94,12 +95,12 @@ pub fn geometric_attenuation(n_light: f64, n_viewer: f64, n_half: f64, v_half: f
     13.0 * U * optics::geometric_attenuation(n_light, n_viewer, n_half, v_half) + 1e8 * FLUSHED
 }
 
-/// cosine_to_half: 12 u: a sum's 5 u halved, and a root's 9 u.
+/// cosine_to_half: 12 u, from half of the sum's 5 u and a root's 9 u.
 pub fn cosine_to_half(sum: DVec3) -> f64 {
     12.0 * U * 0.5 * sum.length_squared().max(1e-30).sqrt() + FLUSHED
 }
 
-/// D for cosines that are off themselves.
+/// D for cosines that are themselves off.
 fn density(distribution: Distribution, cosine: Off, sine_squared: Off, shininess: f64) -> Off {
     let (c, s) = (cosine.value, sine_squared.value);
     let (value, error) = match distribution {
@@ -130,7 +131,7 @@ pub fn sine_squared_to_half(normal: DVec3, sum: DVec3) -> Off {
     Off { value: sine * sine, error: of_cross * (2.0 * sine + of_cross) + 3.0 * U * sine * sine + FLUSHED }
 }
 
-/// D G / (n·v) without its gates.
+/// D G / (n·v) without the conditions on n·l and n·v.
 fn geometry(distribution: Distribution, [normal, light, viewer]: [DVec3; 3], shininess: f64) -> Off {
     let sum = light + viewer;
     let half = optics::safe_normalize(sum);
@@ -141,7 +142,7 @@ fn geometry(distribution: Distribution, [normal, light, viewer]: [DVec3; 3], shi
     let (n_light, n_viewer) = (normal.dot(light), normal.dot(viewer));
     let v_half = 0.5 * sum.length_squared().max(1e-30).sqrt();
     let attenuation = optics::geometric_attenuation(n_light, n_viewer, n_half.value, v_half);
-    // At both ends of every cosine: it falls with n·v and v·h, and rises with n·l and n·h.
+    // At both ends of every cosine: the result decreases with n·v and v·h, and increases with n·l and n·h.
     let (of_light, of_viewer) = (vectors::dot(normal, light), vectors::dot(normal, viewer));
     let of_v_half = cosine_to_half(sum);
     let at = |sign: f64| {
@@ -159,21 +160,22 @@ fn geometry(distribution: Distribution, [normal, light, viewer]: [DVec3; 3], shi
     Off { value, error: error + 1e8 * FLUSHED }
 }
 
-/// Whether rounding decides on n·l > 0 or n·v > 0, and whether they hold.
+/// Returns whether rounding decides on n·l > 0 or n·v > 0, and whether both hold.
 fn gates([normal, light, viewer]: [DVec3; 3]) -> (bool, bool) {
     let open = vectors::is_open(normal, light) || vectors::is_open(normal, viewer);
     (open, normal.dot(light) > 0.0 && normal.dot(viewer) > 0.0)
 }
 
-/// microfacet_lobe, and torrance_sparrow_geometry, which is the one of Trowbridge and Reitz: D with the errors of its cosine and
-/// sin², G with those of its cosines; the product. Either side of n·l > 0 and n·v > 0.
+/// microfacet_lobe, and torrance_sparrow_geometry, which is that of Trowbridge and Reitz: D with the errors of its
+/// cosine and sin², G with those of its cosines, and their product. Either side of n·l > 0 and n·v > 0.
 pub fn microfacet_lobe(distribution: Distribution, directions: [DVec3; 3], shininess: f64) -> Allowed {
     let lobe = geometry(distribution, directions, shininess);
     let (open, in_front) = gates(directions);
     Allowed::from(lobe.error).or(open, || Numbers::from_slice(&[if in_front { 0.0 } else { lobe.value }]))
 }
 
-/// microfacet_reflection: the lobe's error times k_s F, F's times the rest, and 2 u. F is for a cosine that is off by 12 u.
+/// microfacet_reflection: the lobe's error times k_s F, the error of F times the other factors, and 2 u. F is for a
+/// cosine that is off by 12 u.
 pub fn microfacet_reflection(
     (distribution, fresnel): (Distribution, Fresnel),
     directions: [DVec3; 3],
@@ -208,7 +210,7 @@ pub fn microfacet_reflection(
     Allowed::from(error + DVec3::splat(FLUSHED)).or(open, || Numbers::from_slice(&other.to_array()))
 }
 
-/// torrance_sparrow: the same of a dielectric.
+/// torrance_sparrow: the same for a dielectric.
 pub fn torrance_sparrow(directions: [DVec3; 3], shininess: f64, ior: f64) -> Allowed {
     let kind = (Distribution::TrowbridgeReitz, Fresnel::Dielectric);
     let all = microfacet_reflection(kind, directions, shininess, DVec3::X, ior);

@@ -1,7 +1,7 @@
-//! The bounds that the doc comments of `lumbre_optics` state for the f32 twins ("Error of the f32 twin"), as functions of the inputs:
-//! one per function, in the terms of those comments. All to first order in u, except where a step near a corner is evaluated at both
-//! ends; second-order terms are under 10⁻⁵ of them. Not the running error of `lumbre_tests`, which is found by a machine from the
-//! shader itself and which every bound here is checked against.
+//! The bounds in the doc comments of `lumbre_optics` ("Error of the f32 twin") as functions of the inputs, one per
+//! function, in the terms of those comments. All are to first order in u, except where a step near a corner is
+//! evaluated at both ends; terms of second order are under 10⁻⁵ of them. The running error of `lumbre_tests` is
+//! something else: it is derived automatically from the shader itself, and every bound here is checked against it.
 
 pub mod atmosphere;
 pub mod lights;
@@ -20,22 +20,22 @@ use smallvec::SmallVec;
 
 /// u, the relative error of one rounding to f32. A unit in the last place is at most 2 u of a number.
 pub const U: f64 = 5.960_464_477_539_063e-8;
-/// The smallest normal number: what is below it may be taken for zero, in inputs, in between and in results.
+/// The smallest normal number. Smaller numbers may be flushed to zero, in inputs, intermediate values and results.
 pub const FLUSHED: f64 = 1.175_494_350_822_287_5e-38;
 
 /// A few numbers: the results of a function.
 pub type Numbers = SmallVec<[f64; 9]>;
 
-/// How far the results of one input may be off.
+/// How much the results for one input may be off.
 pub struct Allowed {
-    /// Of each result.
+    /// For each result.
     pub error: Numbers,
-    /// Where rounding decides a condition: the results on its other side, which are as good.
+    /// Where rounding decides a condition, the results on its other side, which are equally valid.
     pub other: Option<Numbers>,
 }
 
 impl Allowed {
-    /// The results of `other` are as good if `open`.
+    /// Adds the results of `other` as equally valid if `open`.
     pub fn or(mut self, open: bool, other: impl FnOnce() -> Numbers) -> Self {
         if open {
             self.other = Some(other());

@@ -4,7 +4,7 @@ use std::f64::consts::LN_2;
 
 use super::{FLUSHED, U};
 
-/// A number and how far the device's own may be from it.
+/// A number and how much the device's own may differ from it.
 #[derive(Clone, Copy)]
 pub struct Off {
     pub value: f64,
@@ -25,7 +25,7 @@ impl Off {
     }
 }
 
-/// From the relative error r of a logarithm's sum to that of its exponential; nothing is off by more than 10²⁰ of itself here.
+/// Converts an absolute error r of a logarithm to the relative error of its exponential; r is limited to 50.
 pub fn grown(r: f64) -> f64 {
     r.min(50.0).exp_m1()
 }
@@ -35,8 +35,8 @@ pub fn exponential(x: f64) -> f64 {
     2.0 * U * (3.0 + 2.0 * x.abs())
 }
 
-/// pow(b, n) = exp2(n log2 b), relative: the logarithm, 8 u absolute for bases from 1/2 (2⁻²¹), else 6 u of itself; the product's
-/// rounding; exp2.
+/// pow(b, n) = exp2(n log2 b), relative: the logarithm, off by 8 u absolute for bases from 1/2 (2⁻²¹), otherwise by
+/// 6 u of itself; the product's rounding; exp2.
 fn power_roundings(base: f64, exponent: f64) -> f64 {
     let (base, exponent) = (base.clamp(1e-30, 1.0), exponent.clamp(0.0, 1e7));
     let logarithm = base.log2().abs();
@@ -45,7 +45,8 @@ fn power_roundings(base: f64, exponent: f64) -> f64 {
     LN_2 * (exponent * of_logarithm + U * power) + exponential(power)
 }
 
-/// safe_pow, of a base and an exponent that are off themselves: their effect, taken at both ends, and the roundings.
+/// safe_pow for a base and an exponent that are themselves off: their effect, evaluated at both ends, and the
+/// roundings.
 pub fn safe_pow(base: Off, exponent: Off) -> f64 {
     let power = lumbre_optics::safe_pow;
     let value = power(base.value, exponent.value);
@@ -56,18 +57,18 @@ pub fn safe_pow(base: Off, exponent: Off) -> f64 {
     (high - value).max(value - low) + own + FLUSHED
 }
 
-/// What logarithm_of_one_minus leaves out: z⁶/7 of it and smaller terms, z = x/(2 - x).
+/// The terms that logarithm_of_one_minus omits: z⁶/7 relative, and smaller ones, with z = x/(2 - x).
 fn series(x: f64) -> f64 {
     let z = x / (2.0 - x);
     1.1 * z.powi(6) / 7.0
 }
 
-/// logarithm_of_one_minus: 9 u and the series' end.
+/// logarithm_of_one_minus: 9 u and the omitted terms.
 pub fn logarithm_of_one_minus(x: f64) -> f64 {
     (-x).ln_1p().abs() * (9.0 * U + series(x)) + FLUSHED
 }
 
-/// exp(n/2 ln(1 - sin²)): the sine's and exponent's errors at both ends, 11 u of the exponent, exp.
+/// exp(n/2 ln(1 - sin²)): the errors of sine and exponent at both ends, 11 u of the exponent, and exp.
 fn from_sine(sine_squared: Off, exponent: Off) -> (f64, f64) {
     let logarithm = |s: f64| (-s.clamp(0.0, 0.25)).ln_1p();
     let power = |s: f64, n: f64| (0.5 * n.clamp(0.0, 1e7) * logarithm(s)).exp();
@@ -86,7 +87,7 @@ fn from_sine(sine_squared: Off, exponent: Off) -> (f64, f64) {
     (value, (high - value).max(value - low) + own + FLUSHED)
 }
 
-/// power_of_cosine: the form that is taken, or both and what is between them where the cosine is within its error of .9.
+/// power_of_cosine: the form that is used, or the range of both where the cosine is within its error of .9.
 pub fn power_of_cosine(cosine: Off, sine_squared: Off, exponent: Off) -> f64 {
     let nearly_parallel = f64::from(0.9f32);
     if cosine.low() > nearly_parallel {

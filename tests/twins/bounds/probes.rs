@@ -1,11 +1,12 @@
-//! Bounds of what is read of irradiance volumes.
+//! Bounds of what is read from irradiance volumes.
 
 use glam::{DVec3, DVec4};
 use lumbre_optics::{self as optics, LEAST_OPENNESS};
 
 use super::{FLUSHED, U};
 
-/// ambient_cube: 4 u of the terms of both sums, the openness's times the result, and 5 u of the quotient.
+/// ambient_cube: 4 u of the terms of both sums, the error of the openness times the result, and 5 u of the
+/// quotient.
 pub fn ambient_cube(normal: DVec3, sides: [DVec4; 3]) -> DVec3 {
     let weights = normal * normal;
     let terms: DVec4 = (0..3).map(|axis| weights[axis] * sides[axis].abs()).sum();
@@ -18,7 +19,7 @@ pub fn ambient_cube(normal: DVec3, sides: [DVec4; 3]) -> DVec3 {
         + DVec3::splat(FLUSHED)
 }
 
-/// probe_grid_cell: 2 u of |point scale| + |offset|, and the rounding of the last cell's middle.
+/// probe_grid_cell: 2 u of |point scale| + |offset|, and the rounding of the last cell's centre.
 pub fn probe_grid_cell(point: DVec3, scale: DVec3, offset: DVec3, resolution: DVec3) -> DVec3 {
     2.0 * U * ((point * scale).abs() + offset.abs()) + U * resolution + DVec3::splat(2.0 * FLUSHED)
 }

@@ -6,17 +6,18 @@ use super::lobes::{OffVector, cosine_lobe};
 use super::powers::Off;
 use super::{Allowed, FLUSHED, Numbers, U, vectors};
 
-/// The smallest index that Snell's functions use.
+/// The smallest index that the functions for Snell's law use.
 const SMALLEST_INDEX: f64 = 1e-2_f32 as f64;
 
-/// The square root of what is off by `error`, 9 u of its own: 1/inverseSqrt.
+/// The square root of a number that is off by `error`, with 9 u of its own: 1/inverseSqrt.
 fn root(square: f64, error: f64) -> Off {
     let value = square.max(0.0).sqrt();
     let (low, high) = ((square - error).max(0.0).sqrt(), (square + error).max(0.0).sqrt());
     Off { value, error: (high - value).max(value - low) + 9.0 * U * high + FLUSHED.sqrt() * 1e-8 }
 }
 
-/// g² = (η - 1)(η + 1) + cos²: 3 u of the one, u of the other, u of the sum, and what the cosine brings along.
+/// g² = (η - 1)(η + 1) + cos²: 3 u of the first term, u of the second, u of the sum, and the effect of the cosine's
+/// error.
 fn g(index: Off, cosine: Off) -> (f64, Off) {
     let difference = (index.value - 1.0) * (index.value + 1.0);
     let square = cosine.value * cosine.value;
@@ -27,8 +28,8 @@ fn g(index: Off, cosine: Off) -> (f64, Off) {
     (error, root(value, error))
 }
 
-/// fresnel_dielectric: each amplitude (x - y)/(x + y) is off by 2 (y δx + x δy)/(x + y)² and 7 u of itself; F by the amplitudes times
-/// their errors, and 2 u. Cosine and index may be off themselves.
+/// fresnel_dielectric: each amplitude (x - y)/(x + y) is off by 2 (y δx + x δy)/(x + y)² and 7 u of itself; F is
+/// off by the amplitudes times their errors, and 2 u. Cosine and index may be off themselves.
 pub fn fresnel_dielectric(cosine: Off, eta: Off) -> f64 {
     let cosine = Off { value: cosine.value.clamp(0.0, 1.0), ..cosine };
     let index = eta.value.clamp(1e-4, 1e4);
@@ -48,19 +49,19 @@ pub fn fresnel_dielectric(cosine: Off, eta: Off) -> f64 {
     (part(cosine) + part(along) + 2.0 * U * reflectance).min(1.0)
 }
 
-/// fresnel_normal_reflectance, a channel: the index (1 + r)/(1 - r) of a root r that is off by 9 u, 7 u for its own sum, difference
-/// and quotient.
+/// fresnel_normal_reflectance, one channel: the index (1 + r)/(1 - r) of a root r that is off by 9 u, with 7 u for
+/// its own sum, difference and quotient.
 pub fn fresnel_normal_reflectance(cosine: Off, reflectance: f64) -> f64 {
     let root = reflectance.max(0.0).sqrt().min(f64::from(0.9998f32));
     let index = (1.0 + root) / (1.0 - root);
-    // Reflectances under the normal numbers may count as none.
+    // Reflectances below the normal numbers may be flushed to zero.
     let of_root = 9.0 * U * root + if reflectance.abs() < 2.0 * FLUSHED { FLUSHED.sqrt() * 2.0 } else { 0.0 };
     let of_index = index * 7.0 * U + 2.0 * of_root / ((1.0 - root) * (1.0 - root));
     fresnel_dielectric(cosine, Off { value: index, error: of_index })
 }
 
-/// fresnel_conductor, a channel: the complex root's parts a and b with the errors of what they are roots of, then two quotients of
-/// sums of squares.
+/// fresnel_conductor, one channel: the complex root's parts a and b with the errors of what they are roots of, then
+/// two quotients of sums of squares.
 pub fn fresnel_conductor(cosine: Off, eta: f64, absorption: f64) -> f64 {
     let of_cosine = cosine.error;
     let (c, n, k) = (cosine.value.clamp(0.0, 1.0), eta.clamp(0.0, 1e4), absorption.clamp(0.0, 1e4));
@@ -82,7 +83,7 @@ pub fn fresnel_conductor(cosine: Off, eta: f64, absorption: f64) -> f64 {
         value: smaller,
         error: (product / least - smaller).abs() + 7.0 * U * smaller + FLUSHED / least,
     };
-    // Which of the two is which changes where the real part does: there they are nearly equal.
+    // Which of the two is the larger changes where the real part changes sign; there they are nearly equal.
     let swap = if real.abs() <= of_real { (larger.value - smaller.value).abs() } else { 0.0 };
     let (a, b) = if real > 0.0 { (larger, smaller) } else { (smaller, larger) };
     let (of_a, of_b) = (a.error + swap, b.error + swap);
@@ -116,15 +117,15 @@ pub fn fresnel_schlick(cosine: f64, f0: DVec3) -> DVec3 {
     10.0 * U * away * (DVec3::ONE - f0).abs() + U * sum + DVec3::splat(2.0 * FLUSHED)
 }
 
-/// transmitted_cosine: s = sin/eta is off by 7 u of itself, so 1 - s² by 14 u s² and 3 u of itself, and its root.
+/// transmitted_cosine: s = sin/eta is off by 7 u of itself, so 1 - s² by 14 u s² and 3 u of itself; then its root.
 pub fn transmitted_cosine(sine: f64, eta: f64) -> f64 {
     let s = sine.max(0.0) / eta.max(SMALLEST_INDEX);
     let square = (1.0 - s) * (1.0 + s);
     root(square, U * (14.0 * s * s + 3.0 * square.abs())).error
 }
 
-/// transmitted_direction: cos - g with their errors, times n; l; the sum; made unit over the length eta. Either side of total
-/// reflection, where g² is within its error of 0.
+/// transmitted_direction: cos - g with their errors, times n; minus l; normalized from the length eta. Either side
+/// of total reflection where g² is within its error of 0.
 pub fn transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> Allowed {
     let index = eta.clamp(SMALLEST_INDEX, 1e4);
     let cosine = Off { value: normal.dot(light), error: vectors::dot(normal, light) };
@@ -136,7 +137,7 @@ pub fn transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> Allowed {
     let of_sum =
         of_bent * normal.abs() + U * ((bent * normal).abs() + sum.abs()) + DVec3::splat(3.0 * FLUSHED);
     let unit = lumbre_optics::safe_normalize(sum);
-    // Along the direction itself an error is normalized away; what is across it stays. Their sum bounds both.
+    // An error along the direction itself is normalized away, and one across it remains. Their sum bounds both.
     let moved = (2.0 * of_sum.length() / sum.length().max(1e-15)).min(2.0);
     let error = vectors::safe_normalize(sum) + DVec3::splat(moved);
     let other = if square < 0.0 { unit } else { DVec3::ZERO };

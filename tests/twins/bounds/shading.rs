@@ -5,7 +5,7 @@ use lumbre_optics::{LightSample, ReflectionModel, SurfaceSample};
 
 use super::{Allowed, FLUSHED, Numbers, U, lobes, microfacets, vectors};
 
-/// specular_factor: the chosen model's.
+/// specular_factor: that of the chosen model.
 pub fn specular_factor(
     model: ReflectionModel,
     [normal, light, viewer]: [DVec3; 3],
@@ -24,8 +24,8 @@ pub fn specular_factor(
     }
 }
 
-/// light_contribution: products of three and four roundings, and the errors of n·l and of the specular factor times what multiplies
-/// them.
+/// light_contribution: products with three and four roundings, and the errors of n·l and of the specular factor
+/// times the other factors.
 pub fn light_contribution(
     model: ReflectionModel,
     surface: &SurfaceSample,

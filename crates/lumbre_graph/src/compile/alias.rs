@@ -1,5 +1,6 @@
-//! Lifetimes, memory, and whether attachments are stored. Transients of one shape whose lifetimes do not overlap take
-//! turns in one slot. Time is counted in steps: passes merged into one render pass are alive together.
+//! Lifetimes, memory, and whether attachments are stored. Transient resources of the same shape whose lifetimes do
+//! not overlap use one slot in turn. Lifetimes are counted in steps, so passes merged into one render pass are
+//! alive together.
 
 use crate::compile::cull::Needs;
 use crate::compile::flow::{Flow, Need};
@@ -8,7 +9,7 @@ use crate::plan::CompileOptions;
 use crate::plan::{Memory, ResourcePlan, Slot, Step};
 use crate::resource::{Origin, Shape};
 
-/// What this stage finds.
+/// The result of this stage.
 pub(super) struct Allocation {
     pub resources: Vec<ResourcePlan>,
     pub slots: Vec<Slot>,
@@ -25,7 +26,7 @@ pub(super) fn allocate(
     let declared = &flow.declarations.resources;
     let mut resources: Vec<ResourcePlan> =
         shapes.iter().map(|&shape| ResourcePlan { shape, lifetime: None, slot: None }).collect();
-    // Last step that needs what a resource holds.
+    // The last step that needs the content of a resource.
     let mut last_need: Vec<Option<usize>> = vec![None; resources.len()];
     for (time, step) in steps.iter().enumerate() {
         for access in step.passes.iter().flat_map(|&pass| live(flow, needs, pass)) {
@@ -61,7 +62,8 @@ pub(super) fn allocate(
     Allocation { resources, slots, memory }
 }
 
-/// Gives each transient, in order of first use, the slot of its shape that was free the shortest, or a new one.
+/// Gives each transient resource, in order of first use, the slot of its shape that has been free for the shortest
+/// time, or a new one.
 fn share(flow: &Flow<'_>, resources: &mut [ResourcePlan]) -> Vec<Slot> {
     let mut waiting: Vec<(usize, [usize; 2])> = (0..resources.len())
         .filter(|&index| flow.declarations.resources[index].origin == Origin::Transient)
@@ -96,7 +98,7 @@ fn share(flow: &Flow<'_>, resources: &mut [ResourcePlan]) -> Vec<Slot> {
 
 fn count(flow: &Flow<'_>, resources: &[ResourcePlan], slots: &[Slot], steps: usize) -> Memory {
     let mut memory = Memory::default();
-    // Change of the living bytes at the start of each step.
+    // Change of the bytes in use at the start of each step.
     let mut change = vec![0_i128; steps + 1];
     for (plan, declared) in resources.iter().zip(&flow.declarations.resources) {
         let bytes = plan.shape.bytes();

@@ -1,6 +1,6 @@
-//! Numbers for content: equal numbers, equal content. They stand for what each part of each version of a resource
-//! holds, made of the fingerprint of the pass that wrote it and of the numbers of what that pass took in. Content that
-//! depends on anything without a number has none.
+//! Content numbers, where equal numbers mean equal content. There is a number for each part of each version of a
+//! resource. It is made from the fingerprint of the pass that wrote the part and the numbers of the content that
+//! this pass read. Content that depends on anything without a number has none.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -10,7 +10,7 @@ use crate::declaration::AccessDeclaration;
 use crate::history::{Content, History};
 use crate::resource::Origin;
 
-/// What each version of each resource holds.
+/// The content of each version of each resource.
 pub(super) struct Contents {
     held: Vec<Vec<Content>>,
 }
@@ -35,13 +35,13 @@ impl Contents {
         contents
     }
 
-    /// The number of all that a version holds.
+    /// Returns the number of all parts of a version together.
     pub fn all(&self, resource: usize, version: u32) -> Option<u64> {
         let held = &self.held[resource][version as usize];
         held.values().all(Option::is_some).then(|| number(held))
     }
 
-    /// The number of one part, or with `None` of all.
+    /// Returns the number of one part, or with `None` of all parts.
     pub fn part(&self, resource: usize, version: u32, part: Option<Part>) -> Option<u64> {
         match part {
             Some(_) => *self.held[resource][version as usize].get(&part)?,
@@ -55,7 +55,7 @@ impl Contents {
             let Some(version) = declared.written() else { continue };
             let own = inputs.map(|inputs| number((inputs, at)));
             let part = declared.touched_part();
-            // A write of a part leaves the others as they were, be it since last frame.
+            // Writing one part leaves the others as they were, possibly since last frame.
             let mut held = match flow.need(declared) {
                 Need::Version(below) if part.is_some() => {
                     self.held[declared.resource][below as usize].clone()
@@ -77,7 +77,7 @@ impl Contents {
             if let Some(version) = taken {
                 self.all(declared.resource, version)?.hash(&mut hasher);
             }
-            // Which part is drawn, into what, and what it is cleared to, is of the content too.
+            // The content also depends on which part is drawn, into which resource, and what it is cleared to.
             let resource = &flow.declarations.resources[declared.resource];
             (&resource.name, declared.part, resource.shape).hash(&mut hasher);
             declared.access.hash_clear(&mut hasher);
@@ -86,8 +86,8 @@ impl Contents {
     }
 }
 
-/// The version whose content this access takes in. What last frame left below a write is not taken in: a pass with a
-/// fingerprint says that what it writes does not depend on it.
+/// Returns the version whose content this access reads. What last frame left below a write does not count: a pass
+/// with a fingerprint states that its result does not depend on it.
 fn input(flow: &Flow<'_>, declared: &AccessDeclaration) -> Option<u32> {
     let Need::Version(version) = flow.need(declared) else { return None };
     let reads = !declared.access.writes() || flow.loads(declared);

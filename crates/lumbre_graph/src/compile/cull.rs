@@ -1,5 +1,6 @@
-//! Finds the passes that are needed: backwards from side effects, from what is imported and written, from what is
-//! exported. What is left over is culled, and the reason says who would have read it.
+//! Finds the passes that are needed, going backwards from side effects, from imported resources that are written,
+//! and from exported ones. All others are culled, with a reason that names the passes that would have read their
+//! results.
 
 use crate::compile::flow::{Flow, Need};
 use crate::compile::retain::Retention;
@@ -7,15 +8,15 @@ use crate::declaration::Declarations;
 use crate::error::GraphResult;
 use crate::resource::Origin;
 
-/// Who is needed, and by whom.
+/// Which passes and versions are needed, and why.
 pub(crate) struct Needs {
-    /// Per pass: why it is needed; `None` if it is not.
+    /// Per pass, why it is needed; `None` if it is not.
     pub wanted: Vec<Option<String>>,
-    /// Per resource and version: whether a pass that runs, or the world outside, reads it.
+    /// Per resource and version, whether a running pass or something outside the graph reads it.
     pub versions: Vec<Vec<bool>>,
 }
 
-/// Walks backwards. A pass that runs and needs what is not there is an error.
+/// Finds the needs. It is an error if a running pass needs content that does not exist.
 pub(crate) fn find(flow: &Flow<'_>, retention: &Retention) -> GraphResult<Needs> {
     let declarations = flow.declarations;
     let mut needs = Needs {
@@ -58,8 +59,8 @@ pub(crate) fn find(flow: &Flow<'_>, retention: &Retention) -> GraphResult<Needs>
     while let Some(index) = open.pop() {
         let pass = &declarations.passes[index];
         for declared in &pass.accesses {
-            // An unchanged pass reads nothing, but what it wrote stands upon what others write beside it: other
-            // layers, which may have changed.
+            // An unchanged pass reads nothing, but its result is still on top of what others write in the same
+            // resource: other layers, which may have changed.
             if retention.unchanged[index] && !declared.access.writes() {
                 continue;
             }
@@ -78,7 +79,7 @@ pub(crate) fn find(flow: &Flow<'_>, retention: &Retention) -> GraphResult<Needs>
     Ok(needs)
 }
 
-/// Whether a pass that is called for reads what the last frame left in a retained resource.
+/// Returns true if a pass that is not skipped reads what the last frame left in a retained resource.
 fn reads_last_frame(flow: &Flow<'_>, resource: usize) -> bool {
     flow.declarations.passes.iter().filter(|pass| pass.is_called_for()).any(|pass| {
         pass.accesses.iter().any(|declared| {
@@ -88,7 +89,8 @@ fn reads_last_frame(flow: &Flow<'_>, resource: usize) -> bool {
 }
 
 impl Needs {
-    /// Why a pass that is called for does not run: for each thing it writes, who would read it.
+    /// Returns why a pass is culled: for each resource that it writes, which passes
+    /// would read it.
     pub fn cull_reason(&self, declarations: &Declarations, pass: usize) -> String {
         let mut reasons = Vec::new();
         for declared in &declarations.passes[pass].accesses {

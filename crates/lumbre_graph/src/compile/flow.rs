@@ -1,4 +1,4 @@
-//! What each version holds, now that it is known which passes are skipped, and what each access needs of it.
+//! The content of each version, given which passes are skipped, and what each access needs of it.
 
 use crate::access::{Access, LoadOp};
 use crate::declaration::{AccessDeclaration, Declarations};
@@ -6,24 +6,24 @@ use crate::error::{GraphError, GraphResult};
 use crate::history::History;
 use crate::resource::{Origin, Shape};
 
-/// What an access needs to be there beforehand.
+/// What content an access needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Need {
-    /// Nothing: it overwrites all, or does without.
+    /// Nothing: it overwrites everything, or works without.
     Nothing,
-    /// The content of this version, which there is.
+    /// The content of this version, which exists.
     Version(u32),
-    /// Content that there is not: a fault if the pass runs.
+    /// Content that does not exist, which is a fault if the pass runs.
     Absent,
 }
 
-/// The flow of content through versions.
+/// The flow of content through the versions of all resources.
 pub(crate) struct Flow<'d> {
     pub declarations: &'d Declarations,
-    /// Per resource and version: the version that stands for it. A version that a skipped pass would have made is
-    /// the one before.
+    /// Per resource and version, the version whose content it has. A version that a skipped pass would have made
+    /// has the content of the one before.
     pub effective: Vec<Vec<u32>>,
-    /// Per resource: whether version 0 holds anything (imported, or retained from an earlier frame).
+    /// Per resource, whether version 0 has any content (imported, or retained from an earlier frame).
     pub initial: Vec<bool>,
 }
 
@@ -54,17 +54,17 @@ impl<'d> Flow<'d> {
         }
     }
 
-    /// The version that stands for `version`.
+    /// Returns the version whose content `version` has.
     pub fn standing(&self, resource: usize, version: u32) -> u32 {
         self.effective[resource][version as usize]
     }
 
-    /// The version that stands for the last one.
+    /// Returns the version whose content the last version has.
     pub fn last(&self, resource: usize) -> u32 {
         *self.effective[resource].last().unwrap_or(&0)
     }
 
-    /// What an access of a pass that runs needs.
+    /// Returns what an access of a running pass needs.
     pub fn need(&self, declared: &AccessDeclaration) -> Need {
         let there = self.content(declared);
         match declared.access {
@@ -95,7 +95,7 @@ impl<'d> Flow<'d> {
         }
     }
 
-    /// Whether the attachment loads: its content is kept, not cleared.
+    /// Returns true if the attachment keeps its content and is not cleared.
     pub fn loads(&self, declared: &AccessDeclaration) -> bool {
         match declared.access {
             Access::Color(LoadOp::Load) | Access::Depth(LoadOp::Load) | Access::DepthReadOnly => true,
@@ -106,7 +106,8 @@ impl<'d> Flow<'d> {
         }
     }
 
-    /// Faults that the declaration has whatever the scene holds: a read of a transient that nobody wrote before.
+    /// Checks for faults that do not depend on the content of the scene: a read of a transient resource that no
+    /// pass has written before.
     pub fn check_reads(&self) -> GraphResult<()> {
         for (index, pass) in self.declarations.passes.iter().enumerate() {
             for declared in &pass.accesses {
@@ -124,7 +125,7 @@ impl<'d> Flow<'d> {
         Ok(())
     }
 
-    /// The error of a pass that needs what is not there.
+    /// Returns the error for a pass that needs content that does not exist.
     pub fn absent(&self, pass: usize, declared: &AccessDeclaration) -> GraphError {
         let resource = &self.declarations.resources[declared.resource];
         let reader = &self.declarations.passes[pass];
@@ -165,7 +166,7 @@ impl<'d> Flow<'d> {
         }
     }
 
-    /// The version with the content that this access finds, if there is any.
+    /// Returns the version with the content that this access finds, if there is any.
     fn content(&self, declared: &AccessDeclaration) -> Option<u32> {
         let standing = self.standing(declared.resource, declared.version);
         (standing > 0 || self.initial[declared.resource]).then_some(standing)
@@ -180,7 +181,7 @@ impl<'d> Flow<'d> {
         shape.texture().is_some_and(|texture| texture.is_one_part())
     }
 
-    /// Whether no pass of this frame that is called for has written this part before.
+    /// Returns true if no pass of this frame that is not skipped has written this part before.
     fn is_first(&self, declared: &AccessDeclaration) -> bool {
         if self.standing(declared.resource, declared.version) == 0 {
             return true;
@@ -195,7 +196,7 @@ impl<'d> Flow<'d> {
         })
     }
 
-    /// The part of `resource` that `pass` writes to make `version`; `None` is all of it.
+    /// Returns the part of `resource` that `pass` writes to make `version`; `None` for all of it.
     pub fn written_part(&self, pass: usize, resource: usize, version: u32) -> Option<crate::access::Part> {
         self.declarations.passes[pass]
             .accesses

@@ -1,5 +1,6 @@
-//! Makes one wgpu render pass of raster passes in a row that draw into the same attachments. On tile-based GPUs and on
-//! software rasterizers each render pass more is a full drain and a round trip of the attachments through memory.
+//! Combines consecutive raster passes that draw into the same attachments into one wgpu render pass. On tile-based
+//! GPUs and software rasterizers each additional render pass means waiting for the previous one and moving the
+//! attachments through memory.
 
 use crate::access::{Access, LoadOp};
 use crate::compile::cull::Needs;
@@ -7,7 +8,7 @@ use crate::compile::flow::{Flow, Need};
 use crate::declaration::{AccessDeclaration, PassKind};
 use crate::plan::{ColorTarget, DepthTarget, Step, Target};
 
-/// The steps of the passes that run, in order. Whether attachments are stored is left for later.
+/// Returns the steps of the passes that run, in order. Whether attachments are stored is decided later.
 pub(super) fn steps(
     flow: &Flow<'_>,
     needs: &Needs,
@@ -26,8 +27,8 @@ pub(super) fn steps(
     steps
 }
 
-/// The accesses that a pass that runs really makes: no resolve that nobody reads, no optional read of what is not
-/// there.
+/// Returns the accesses that a running pass really makes: no resolve whose result is not read, and no optional read
+/// of content that does not exist.
 pub(super) fn live<'f>(
     flow: &'f Flow<'_>,
     needs: &'f Needs,
@@ -85,7 +86,7 @@ fn can_join(flow: &Flow<'_>, group: &Step, step: &Step, pass: usize) -> bool {
         && group.colors.iter().zip(&step.colors).all(|(held, asked)| {
             held.target == asked.target
                 && asked.clear.is_none()
-                // A resolve may move to the end of the group only if the end resolves into the same target.
+                // A resolve may only move to the end of the group if the last pass resolves into the same target.
                 && (held.resolve.is_none() || held.resolve == asked.resolve)
         });
     let depth = match (&group.depth, &step.depth) {
@@ -100,7 +101,8 @@ fn can_join(flow: &Flow<'_>, group: &Step, step: &Step, pass: usize) -> bool {
         && group.passes.iter().all(|&member| compatible(flow, member, pass))
 }
 
-/// Whether two passes can share a render pass: what one writes the other uses only as the same attachment.
+/// Returns true if two passes can share a render pass: what one writes, the other may only use as the same
+/// attachment.
 fn compatible(flow: &Flow<'_>, a: usize, b: usize) -> bool {
     let accesses = |pass: usize| &flow.declarations.passes[pass].accesses;
     accesses(a).iter().all(|first| {

@@ -1,9 +1,9 @@
-//! Compiling: from declarations to a plan, without a device. Each stage is a file of its own:
+//! Compiling: from declarations to a plan, without a device. Each stage has its own file:
 //!
 //! ```text
 //! names ─► shapes ─► order ─► flow ─► retain ─► cull ─► merge ─► alias
-//! unique   formats   cycle    what a  what is   who is  one wgpu  memory
-//!          sizes     or sort  version unchanged needed  pass      in turns
+//! unique   formats   cycle    what a  what is   what is one wgpu  memory
+//!          sizes     or sort  version unchanged needed  pass      shared
 //!                             holds
 //! ```
 
@@ -77,7 +77,7 @@ fn statuses(declarations: &Declarations, retention: &retain::Retention, needs: &
     declarations.passes.iter().enumerate().map(status).collect()
 }
 
-/// "the scene has no lightmapped mesh and no fog"
+/// Returns a reason such as "the scene has no lightmapped mesh and no fog".
 pub(crate) fn skip_reason(pass: &PassDeclaration) -> String {
     let absent: Vec<String> = pass
         .calls_for

@@ -1,7 +1,8 @@
-//! Sorts the passes so that each runs after all it depends on, in order of declaration where that leaves a choice.
+//! Sorts the passes so that each runs after everything it depends on, in order of declaration where that leaves a
+//! choice.
 //!
-//! Dependencies are taken between all passes, the skipped and culled too: the order, and whether there is a cycle, do
-//! not change with the scene's content.
+//! Dependencies between all passes count, including skipped and culled ones, so that neither the order nor the
+//! existence of a cycle depends on the content of the scene.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -10,7 +11,7 @@ use crate::declaration::Declarations;
 use crate::error::{CycleStep, GraphError, GraphResult};
 use crate::nearest::nearest;
 
-/// Why a pass waits for another; the text is made only for an error.
+/// Why a pass waits for another; the text is only made for an error.
 #[derive(Clone, Copy)]
 enum Because {
     Reads(usize, u32),
@@ -40,7 +41,7 @@ impl Because {
 struct Edges {
     /// Per pass, the passes that wait for it.
     next: Vec<Vec<(usize, Because)>>,
-    /// Per pass, how many edges lead to it.
+    /// Per pass, the number of edges that lead to it.
     waits_for: Vec<usize>,
 }
 
@@ -53,7 +54,7 @@ impl Edges {
     }
 }
 
-/// The passes in a valid order.
+/// Returns the passes in a valid order.
 pub(super) fn sort(declarations: &Declarations) -> GraphResult<Vec<usize>> {
     let Edges { next, mut waits_for } = edges(declarations)?;
     let count = next.len();
@@ -118,8 +119,8 @@ fn edges(declarations: &Declarations) -> GraphResult<Edges> {
     Ok(edges)
 }
 
-/// One circle among the passes that could not be sorted. Each of them waits for another of them, so walking against
-/// the edges from any of them must come back to where it has been.
+/// Returns one cycle among the passes that could not be sorted. Each of them waits for another of them, so walking
+/// against the edges from any of them must lead back to a pass already visited.
 fn cycle(declarations: &Declarations, next: &[Vec<(usize, Because)>], waits_for: &[usize]) -> Vec<CycleStep> {
     let stuck = |pass: usize| waits_for[pass] > 0;
     let awaited = |pass: usize| {
@@ -132,7 +133,7 @@ fn cycle(declarations: &Declarations, next: &[Vec<(usize, Because)>], waits_for:
     while let Some((from, because)) = awaited(pass) {
         if let Some(start) = walked.iter().position(|&(seen, _)| seen == from) {
             walked.push((from, because));
-            // Steps before `start + 1` lead into the circle and are not of it.
+            // The steps before `start + 1` lead into the cycle and are not part of it.
             return walked[start + 1..]
                 .iter()
                 .rev()

@@ -1,9 +1,10 @@
-//! Finds the passes whose retained results still hold from an earlier frame.
+//! Finds the passes whose retained results are still valid from an earlier frame.
 //!
-//! By the numbers of [`content`](super::content): a retained resource is unchanged if the number that its last version will have is the
-//! number it has, and nobody looks at a version in between; a pass is unchanged if all it writes is. Resources of many
-//! layers or mip levels that are only written part by part are followed part by part: one shadow map in an array of
-//! them is drawn again without the others. Content without a number is never unchanged: this errs towards running.
+//! This uses the numbers of [`content`](super::content): a retained resource is unchanged if the number that its
+//! last version will have is the number that it has now, and no pass reads a version in between. A pass is
+//! unchanged if everything that it writes is. Resources with many layers or mip levels that are only written part
+//! by part are tracked part by part, so that one shadow map in an array can be drawn again without the others.
+//! Content without a number is never unchanged: in doubt a pass runs.
 
 use crate::access::Part;
 use crate::compile::content::Contents;
@@ -11,7 +12,7 @@ use crate::compile::flow::Flow;
 use crate::history::{Content, History, Retained};
 use crate::resource::{Origin, Shape};
 
-/// What is unchanged, and the numbers.
+/// Which passes are unchanged, and the numbers that this follows from.
 pub(crate) struct Retention {
     /// Per pass.
     pub unchanged: Vec<bool>,
@@ -44,7 +45,8 @@ pub(super) fn find(flow: &Flow<'_>, order: &[usize], history: &History) -> Reten
             && writes.peek().is_some()
             && writes.all(|write| declarations.resources[write.resource].origin == Origin::Retained);
     }
-    // A pass runs if any group it writes differs, and a group differs if any of its writers runs; until it settles.
+    // A pass runs if any group that it writes differs, and a group differs if any of its writers runs; repeat until
+    // nothing changes.
     loop {
         let mut settled = true;
         for group in &mut groups {
@@ -63,7 +65,7 @@ pub(super) fn find(flow: &Flow<'_>, order: &[usize], history: &History) -> Reten
     }
 }
 
-/// What will be known once the passes that run have run.
+/// Returns what will be known once the passes that run have run.
 pub(super) fn after(
     flow: &Flow<'_>,
     retention: &Retention,
@@ -82,7 +84,7 @@ pub(super) fn after(
         for group in retention.groups.iter().filter(|group| group.resource == index) {
             let running = group.writers.iter().filter(|&&writer| runs(writer)).count();
             if running > 0 {
-                // A write of all of it leaves nothing of what the parts held.
+                // Writing everything invalidates what was known about single parts.
                 if group.part.is_none() {
                     record.content.clear();
                 }
@@ -95,7 +97,7 @@ pub(super) fn after(
             after.retained.insert(resource.name.clone(), record);
         }
     }
-    // What this frame does not mention may come back; the executor decides how long that is kept.
+    // Resources that this frame does not declare may come back; the executor decides how long they are kept.
     for (name, record) in &before.retained {
         if !flow.declarations.resources.iter().any(|resource| resource.name == *name) {
             after.retained.insert(name.clone(), record.clone());
@@ -137,7 +139,7 @@ fn groups(flow: &Flow<'_>, contents: &Contents, history: &History) -> Vec<Group>
             }
         }
         for group in &mut groups[first..] {
-            // The number of all of it stands only as long as no part was written since.
+            // The number of the whole is only valid as long as no single part was written since.
             let alone = |content: &Content| group.part.is_some() || content.len() == 1;
             let held =
                 kept.filter(|kept| alone(&kept.content)).and_then(|kept| *kept.content.get(&group.part)?);
@@ -147,8 +149,8 @@ fn groups(flow: &Flow<'_>, contents: &Contents, history: &History) -> Vec<Group>
     groups
 }
 
-/// Whether a pass that is called for reads a version of this frame that is not the last: then what the last frame left
-/// cannot stand for it.
+/// Returns true if a pass that is not skipped reads a version of this frame other than the last. Then what the last
+/// frame left cannot replace it.
 fn read_between(flow: &Flow<'_>, resource: usize) -> bool {
     let last = flow.last(resource);
     flow.declarations.passes.iter().filter(|pass| pass.is_called_for()).any(|pass| {

@@ -1,4 +1,5 @@
-//! Checks each resource's shape, and that each access fits it: format, size, samples, parts, usage.
+//! Checks each resource's shape, and that each access is compatible with it: format, size, samples, parts and
+//! usage.
 
 use crate::access::Access;
 use crate::declaration::{AccessDeclaration, Declarations, PassDeclaration, PassKind};
@@ -74,7 +75,7 @@ fn texture_fault(texture: &TextureDescriptor) -> Option<String> {
     {
         return Some("a multisampled texture has one mip level and two dimensions".into());
     }
-    // Video formats of several planes have no byte size that adds up, and nothing draws into them.
+    // Video formats with several planes have no simple size in bytes, and nothing draws into them.
     texture.format.is_multi_planar_format().then(|| format!("format {:?} has several planes", texture.format))
 }
 
@@ -200,7 +201,7 @@ impl PassCheck<'_> {
         }))
     }
 
-    /// No resource is written and used otherwise in one pass, except in parts that do not touch.
+    /// Checks that no resource is written and also used in another way in one pass, except in separate parts.
     fn conflicts(&self) -> GraphResult<()> {
         for (index, first) in self.pass.accesses.iter().enumerate() {
             for second in &self.pass.accesses[index + 1..] {
@@ -209,7 +210,7 @@ impl PassCheck<'_> {
                     _ => true,
                 };
                 let writes = first.access.writes() || second.access.writes();
-                // The encoder orders its own commands: a transfer pass may write what it then reads.
+                // The encoder orders its own commands, so a transfer pass may read what it has written.
                 let ordered = self.pass.kind == PassKind::Transfer;
                 if first.resource == second.resource && writes && overlap && !ordered {
                     return Err(Box::new(GraphError::AccessConflict {
@@ -225,7 +226,7 @@ impl PassCheck<'_> {
         Ok(())
     }
 
-    /// Attachments of one pass agree in size and samples, and a resolve in format too.
+    /// Checks that the attachments of one pass agree in size and samples, and those of a resolve in format too.
     fn attachments(&self) -> GraphResult<()> {
         let mut first: Option<(&AccessDeclaration, &TextureDescriptor)> = None;
         let mut colors: Vec<(&AccessDeclaration, &TextureDescriptor)> = Vec::new();

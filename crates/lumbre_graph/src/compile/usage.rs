@@ -1,14 +1,15 @@
-//! Infers the GPU usages of each resource from the accesses of all passes, skipped and culled ones too: so the usages,
-//! and with them the GPU objects, stay the same while the scene's content comes and goes.
+//! Infers the GPU usages of each resource from the accesses of all passes, including skipped and culled ones. The
+//! usages, and with them the GPU objects, therefore stay the same while the content of the scene changes.
 
 use crate::declaration::Declarations;
 use crate::plan::CompileOptions;
 use crate::resource::{Origin, Shape};
 
-/// The shape of each resource with all usages it needs.
+/// Returns the shape of each resource with all usages that it needs.
 pub(super) fn infer(declarations: &Declarations, options: CompileOptions) -> Vec<Shape> {
     let mut shapes: Vec<Shape> = declarations.resources.iter().map(|resource| resource.shape).collect();
-    // What an imported resource allows is its maker's word; what the passes need of it is only compared with that.
+    // The usages of an imported resource are given by its creator; those that the passes need are only compared
+    // with them.
     for (shape, resource) in shapes.iter_mut().zip(&declarations.resources) {
         if resource.origin == Origin::Imported {
             *shape = shape.without_usage();

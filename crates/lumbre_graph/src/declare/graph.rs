@@ -1,4 +1,4 @@
-//! The graph of one frame, built anew each frame: resources, passes and what they run.
+//! The graph of one frame, which is built anew for each frame: resources, passes and their bodies.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -19,18 +19,19 @@ static NEXT_GRAPH: AtomicU64 = AtomicU64::new(1);
 
 /// A graph of passes over textures and buffers.
 ///
-/// `'a` is how long what the passes borrow lives; `User` is what [`Executor::execute_with`](crate::Executor::execute_with) lends
-/// to one pass after the other as `context.user`, for state that more than one of them changes.
+/// `'a` is the lifetime of what the bodies of the passes borrow. `User` is state that several passes share:
+/// [`Executor::execute_with`](crate::Executor::execute_with) lends it to one pass after the other as
+/// `context.user`.
 pub struct Graph<'a, User = ()> {
     pub(crate) id: u64,
     pub(crate) declarations: Declarations,
     pub(crate) bodies: Vec<Option<Body<'a, User>>>,
-    /// Of the passes that are declared from now on.
+    /// The owner of the passes that are declared from now on.
     owner: Option<Label>,
 }
 
 impl Graph<'_> {
-    /// An empty graph. The label is for messages and debuggers.
+    /// Creates an empty graph. The label is for messages and debuggers.
     #[must_use]
     pub fn new(label: impl Into<Label>) -> Self {
         Self::with_user(label)
@@ -38,7 +39,8 @@ impl Graph<'_> {
 }
 
 impl<'a, User> Graph<'a, User> {
-    /// An empty graph whose passes share what [`Executor::execute_with`](crate::Executor::execute_with) lends to them.
+    /// Creates an empty graph whose passes share the state that
+    /// [`Executor::execute_with`](crate::Executor::execute_with) lends them.
     #[must_use]
     pub fn with_user(label: impl Into<Label>) -> Self {
         Self {
@@ -54,25 +56,26 @@ impl<'a, User> Graph<'a, User> {
         }
     }
 
-    /// The part of the program that the passes declared from now on belong to, until another is named: reports and explanations name it, so that what passes cost can be
-    /// summed by part. Nobody's at first.
+    /// Sets the part of the program that the passes declared from now on belong to, until the next call. Reports
+    /// and explanations name it, so that the cost of passes can be summed by part. At first passes have no owner.
     pub fn set_owner(&mut self, owner: impl Into<Label>) {
         self.owner = Some(owner.into());
     }
 
-    /// A texture that lives for a part of this frame only.
+    /// Declares a transient texture, which lives for part of this frame only.
     #[track_caller]
     pub fn texture(&mut self, name: impl Into<Label>, descriptor: TextureDescriptor) -> TextureHandle {
         self.resource(name.into(), Shape::Texture(descriptor), Origin::Transient, Site::caller())
     }
 
-    /// A buffer that lives for a part of this frame only.
+    /// Declares a transient buffer, which lives for part of this frame only.
     #[track_caller]
     pub fn buffer(&mut self, name: impl Into<Label>, descriptor: BufferDescriptor) -> BufferHandle {
         self.resource(name.into(), Shape::Buffer(descriptor), Origin::Transient, Site::caller())
     }
 
-    /// A texture that the executor keeps from frame to frame under its name. Version 0 is what last frame left.
+    /// Declares a texture that the executor keeps from frame to frame under its name. Version 0 is what last frame
+    /// left.
     #[track_caller]
     pub fn retained_texture(
         &mut self,
@@ -82,27 +85,28 @@ impl<'a, User> Graph<'a, User> {
         self.resource(name.into(), Shape::Texture(descriptor), Origin::Retained, Site::caller())
     }
 
-    /// A buffer that the executor keeps from frame to frame under its name. Version 0 is what last frame left.
+    /// Declares a buffer that the executor keeps from frame to frame under its name. Version 0 is what last frame
+    /// left.
     #[track_caller]
     pub fn retained_buffer(&mut self, name: impl Into<Label>, descriptor: BufferDescriptor) -> BufferHandle {
         self.resource(name.into(), Shape::Buffer(descriptor), Origin::Retained, Site::caller())
     }
 
-    /// A texture from outside, bound by its name in [`Imports`](crate::Imports) when the graph runs.
+    /// Declares an external texture, which is bound by its name in [`Imports`](crate::Imports) when the graph runs.
     #[track_caller]
     pub fn import_texture(&mut self, name: impl Into<Label>, descriptor: TextureDescriptor) -> TextureHandle {
         self.resource(name.into(), Shape::Texture(descriptor), Origin::Imported, Site::caller())
     }
 
-    /// A buffer from outside, bound by its name in [`Imports`](crate::Imports) when the graph runs. It may be larger
-    /// than described.
+    /// Declares an external buffer, which is bound by its name in [`Imports`](crate::Imports) when the graph runs.
+    /// It may be larger than described.
     #[track_caller]
     pub fn import_buffer(&mut self, name: impl Into<Label>, descriptor: BufferDescriptor) -> BufferHandle {
         self.resource(name.into(), Shape::Buffer(descriptor), Origin::Imported, Site::caller())
     }
 
-    /// Says what an imported resource holds, as a number that changes whenever its content does. Without it, passes
-    /// that read it are never [`Unchanged`](crate::Status::Unchanged).
+    /// Sets the fingerprint of an imported resource's content, a number that changes whenever the content does.
+    /// Without it, passes that read the resource are never [`Unchanged`](crate::Status::Unchanged).
     #[track_caller]
     pub fn fingerprint<K: ResourceKind>(&mut self, handle: &Handle<K>, content: u64) {
         let site = Site::caller();
@@ -111,7 +115,8 @@ impl<'a, User> Graph<'a, User> {
         }
     }
 
-    /// Keeps this version until after the frame: its passes are not culled, and the executor hands it out by name.
+    /// Keeps this version until after the frame: the passes that make it are not culled, and the executor returns
+    /// it by name.
     #[track_caller]
     pub fn export<K: ResourceKind>(&mut self, handle: &Handle<K>) {
         let site = Site::caller();
@@ -138,23 +143,23 @@ impl<'a, User> Graph<'a, User> {
         self.pass(name.into(), Site::caller())
     }
 
-    /// Compiles as for a first frame. Pure: touches no device.
+    /// Compiles the graph as for a first frame, without any device.
     ///
     /// # Errors
-    /// The first fault of the declaration, see [`GraphError`].
+    /// The first fault of the declarations, see [`GraphError`].
     pub fn compile(&self) -> GraphResult<Plan> {
         self.compile_with(&History::default(), CompileOptions::default())
     }
 
-    /// Compiles knowing what earlier frames left. Pure: touches no device.
+    /// Compiles the graph with the knowledge of what earlier frames left, without any device.
     ///
     /// # Errors
-    /// The first fault of the declaration, see [`GraphError`].
+    /// The first fault of the declarations, see [`GraphError`].
     pub fn compile_with(&self, history: &History, options: CompileOptions) -> GraphResult<Plan> {
         compile::compile(&self.declarations, history, options)
     }
 
-    /// The index of a handle's resource, or a fault recorded if it is another graph's.
+    /// Returns the index of a handle's resource, or records a fault if the handle is another graph's.
     pub(crate) fn own<K: ResourceKind>(
         &mut self,
         pass: Label,
@@ -175,7 +180,7 @@ impl<'a, User> Graph<'a, User> {
     }
 
     fn resource<K>(&mut self, name: Label, shape: Shape, origin: Origin, site: Site) -> Handle<K> {
-        // More than 2^32 resources would not fit into memory long before this.
+        // 2^32 resources would not fit into memory.
         let index = u32::try_from(self.declarations.resources.len()).unwrap_or(u32::MAX);
         self.declarations.resources.push(ResourceDeclaration {
             name,

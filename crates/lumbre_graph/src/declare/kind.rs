@@ -1,4 +1,4 @@
-//! Marks at type level: which accesses a resource has, and which methods a pass has. No data.
+//! Type-level markers: which accesses a resource has, and which methods a pass has.
 
 use crate::access::{Access, BufferRead, BufferWrite, TextureRead, TextureWrite};
 use crate::declaration::PassKind;
@@ -13,7 +13,7 @@ mod sealed {
     impl Sealed for super::Transfer {}
 }
 
-/// What a handle may name: [`Texture`] or [`Buffer`].
+/// The kind of resource that a handle names: [`Texture`] or [`Buffer`].
 pub trait ResourceKind: sealed::Sealed {
     /// How a pass may read it.
     type Read;
@@ -27,7 +27,7 @@ pub trait ResourceKind: sealed::Sealed {
     fn write_access(how: Self::Write) -> AnyAccess;
 }
 
-/// An access of either kind of resource; made and used inside this crate only.
+/// An access to either kind of resource, which is made and used inside this crate only.
 #[doc(hidden)]
 pub struct AnyAccess(pub(crate) Access);
 
@@ -57,7 +57,7 @@ impl ResourceKind for Buffer {
 
 /// The kinds of pass at type level: [`Raster`], [`Compute`], [`Transfer`].
 pub trait PassType: sealed::Sealed {
-    /// The same as a value.
+    /// The same kind as a value.
     const KIND: PassKind;
 }
 
@@ -67,7 +67,7 @@ pub enum Raster {}
 /// A pass that dispatches.
 #[derive(Debug)]
 pub enum Compute {}
-/// A pass that has the command encoder.
+/// A pass that records onto the command encoder.
 #[derive(Debug)]
 pub enum Transfer {}
 

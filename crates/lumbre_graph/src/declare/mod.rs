@@ -1,5 +1,5 @@
-//! Declaring: the graph, its resources and its passes, as data and closures. Nothing here decides anything; that is
-//! [`compile`](crate::compile)'s part.
+//! Declaring the graph, its resources and its passes, as data and closures. All decisions are made in
+//! [`compile`](crate::compile).
 
 pub(crate) mod graph;
 pub(crate) mod kind;

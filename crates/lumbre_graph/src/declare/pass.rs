@@ -19,33 +19,35 @@ pub struct PassBuilder<'g, 'a, K, User> {
 }
 
 impl<'g, 'a, K: PassType, User> PassBuilder<'g, 'a, K, User> {
-    /// Of the pass declared last.
+    /// A builder for the pass that was declared last.
     pub(crate) fn new(graph: &'g mut Graph<'a, User>) -> Self {
         let index = graph.declarations.passes.len() - 1;
         Self { graph, index, kind: PhantomData }
     }
 
-    /// What the pass calls for, and whether it is there ("point lights", "a lightmapped mesh"). If anything that a pass
-    /// calls for is not there, the pass is skipped: each version it would have written is the one before.
+    /// Adds something that the pass calls for, and whether it is there ("point lights", "a lightmapped mesh"). If
+    /// anything that a pass calls for is not there, the pass is skipped: each version that it would have written
+    /// has the content of the version before.
     pub fn calls_for(mut self, there: bool, what: impl Into<Label>) -> Self {
         self.pass().calls_for.push((there, what.into()));
         self
     }
 
-    /// An effect outside the graph ("presents the frame"): a pass that has one is never culled.
+    /// Adds an effect outside the graph ("presents the frame"). A pass that has one is never culled.
     pub fn side_effect(mut self, what: impl Into<Label>) -> Self {
         self.pass().side_effects.push(what.into());
         self
     }
 
-    /// A number that changes whenever anything changes that the pass depends on, except the resources it reads (the
-    /// graph follows those by itself). If all that it writes is retained and holds the same already, it does not run.
+    /// Sets a number that changes whenever anything changes that the pass depends on, except for the resources that
+    /// it reads (which the graph tracks itself). If everything that the pass writes is retained and already has the
+    /// resulting content, the pass does not run.
     pub fn fingerprint(mut self, inputs: u64) -> Self {
         self.pass().fingerprint = Some(inputs);
         self
     }
 
-    /// Runs after the pass of this name, for an order that no resource tells of.
+    /// Makes the pass run after the pass with this name, for dependencies that no resource expresses.
     pub fn after(mut self, pass: impl Into<Label>) -> Self {
         self.pass().after.push(pass.into());
         self
@@ -57,7 +59,7 @@ impl<'g, 'a, K: PassType, User> PassBuilder<'g, 'a, K, User> {
         self.access(handle, access, false)
     }
 
-    /// Reads a texture or a buffer if any pass that runs has written it; the pass copes without.
+    /// Reads a texture or a buffer if any pass that runs has written it. The pass has to work without it.
     pub fn reads_optional<R: ResourceKind>(self, handle: &Handle<R>, how: R::Read) -> Self {
         let AnyAccess(access) = R::read_access(how);
         self.access(handle, access, true)
@@ -68,13 +70,13 @@ impl<'g, 'a, K: PassType, User> PassBuilder<'g, 'a, K, User> {
         self.reads(handle, TextureRead::Sampled)
     }
 
-    /// Writes a texture or a buffer, keeping what it does not overwrite.
+    /// Writes a texture or a buffer, and keeps the parts that are not overwritten.
     pub fn writes<R: ResourceKind>(self, handle: &mut Handle<R>, how: R::Write) -> Self {
         let AnyAccess(access) = R::write_access(how);
         self.write(handle, access)
     }
 
-    /// Restricts the read, write or attachment declared just before to one mip level of one layer.
+    /// Restricts the read, write or attachment that was declared last to one mip level of one layer.
     pub fn part(mut self, part: Part) -> Self {
         if let Some(last) = self.pass().accesses.last_mut() {
             last.part = Some(part);
@@ -138,8 +140,9 @@ impl<'a, User> PassBuilder<'_, 'a, Raster, User> {
         self.write(handle, Access::Color(load))
     }
 
-    /// Resolves the multisampled colour attachment declared last into a texture of one sample. Several passes in a row
-    /// may name the same target: the resolve happens once, after the last of them, and only if the target is read.
+    /// Resolves the multisampled colour attachment that was declared last into a texture with one sample. Several
+    /// consecutive passes may name the same target: the resolve happens once, after the last of them, and only if
+    /// the target is read.
     pub fn resolve(mut self, target: &mut TextureHandle) -> Self {
         let colors = |pass: &PassDeclaration| {
             pass.accesses.iter().filter(|declared| matches!(declared.access, Access::Color(_))).count()
@@ -153,31 +156,31 @@ impl<'a, User> PassBuilder<'_, 'a, Raster, User> {
         }
     }
 
-    /// Tests and writes depth. Values are the depth buffer's own, 0 to 1; reversed-Z clears to 0.
+    /// Tests and writes depth. Values are those of the depth buffer, 0 to 1; with reversed Z it is cleared to 0.
     pub fn depth(self, handle: &mut TextureHandle, load: LoadOp<f32>) -> Self {
         self.write(handle, Access::Depth(load))
     }
 
-    /// Tests depth and does not write it; the pass may sample the same texture.
+    /// Tests depth without writing it; the pass may also sample the same texture.
     pub fn depth_read_only(self, handle: &TextureHandle) -> Self {
         self.access(handle, Access::DepthReadOnly, false)
     }
 
-    /// What draws. Without it the graph compiles but does not run.
+    /// Sets the function that records the draw calls. Without it the graph can be compiled but not run.
     pub fn run(self, body: impl FnOnce(&mut RasterContext<'_, User>) -> BodyResult + 'a) {
         self.graph.bodies[self.index] = Some(Body::Raster(Box::new(body)));
     }
 }
 
 impl<'a, User> PassBuilder<'_, 'a, Compute, User> {
-    /// What dispatches. Without it the graph compiles but does not run.
+    /// Sets the function that records the dispatches. Without it the graph can be compiled but not run.
     pub fn run(self, body: impl FnOnce(&mut ComputeContext<'_, User>) -> BodyResult + 'a) {
         self.graph.bodies[self.index] = Some(Body::Compute(Box::new(body)));
     }
 }
 
 impl<'a, User> PassBuilder<'_, 'a, Transfer, User> {
-    /// What records onto the encoder. Without it the graph compiles but does not run.
+    /// Sets the function that records onto the encoder. Without it the graph can be compiled but not run.
     pub fn run(self, body: impl FnOnce(&mut TransferContext<'_, User>) -> BodyResult + 'a) {
         self.graph.bodies[self.index] = Some(Body::Transfer(Box::new(body)));
     }

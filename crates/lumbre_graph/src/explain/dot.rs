@@ -1,5 +1,5 @@
-//! The explanation as a graph for Graphviz: boxes are passes, ellipses are versions of resources, frames around passes
-//! are merged groups, dashed grey is what does not run.
+//! The explanation as a Graphviz graph. Boxes are passes, ellipses are versions of resources, frames around passes
+//! are merged groups, and what does not run is dashed grey.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -76,7 +76,7 @@ fn version_id(used: &Use, version: u32) -> String {
     quote(&format!("resource {} {version}", used.resource))
 }
 
-/// A DOT string: quotes and backslashes escaped, line breaks as DOT writes them.
+/// A DOT string, with quotes, backslashes and line breaks escaped.
 fn quote(text: &str) -> String {
     let escaped = text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n");
     format!("\"{escaped}\"")

@@ -1,5 +1,5 @@
-//! Explaining a plan: what became of every pass and resource, and why, as data. The text, JSON and DOT are three
-//! renderings of the same data; none of them knows more than the others.
+//! Explains a plan: what happens to every pass and resource, and why, as data. Text, JSON and DOT are three
+//! renderings of the same data, with the same information.
 
 mod dot;
 mod text;
@@ -8,25 +8,26 @@ use crate::declaration::{AccessDeclaration, PassKind};
 use crate::plan::{Memory, Plan, Status};
 use crate::resource::{Origin, Shape, flags};
 
-/// A plan, explained.
+/// A plan with its reasons, as data.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Explanation {
     /// The graph's label.
     pub graph: String,
-    /// All passes in the order they run in; those that do not run where they would have.
+    /// All passes in execution order; those that do not run are where they would have been.
     pub passes: Vec<PassExplanation>,
     /// All resources in order of declaration.
     pub resources: Vec<ResourceExplanation>,
-    /// Bytes.
+    /// Memory use in bytes.
     pub memory: Memory,
 }
 
-/// What became of a pass.
+/// What happens to a pass.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct PassExplanation {
     /// Its name.
     pub name: String,
-    /// The part of the program that declared it, if the graph was told ([`Graph::set_owner`](crate::Graph::set_owner)).
+    /// The part of the program that declared it, if the graph knows it
+    /// ([`Graph::set_owner`](crate::Graph::set_owner)).
     pub owner: Option<String>,
     /// Raster, compute or transfer.
     pub kind: PassKind,
@@ -35,7 +36,7 @@ pub struct PassExplanation {
     pub status: Status,
     /// What it calls for, each with whether it is there.
     pub calls_for: Vec<Calling>,
-    /// Which wgpu pass of the frame it is in, from 0; passes of the same group are merged. `None` if it does not run.
+    /// Index of its wgpu pass in the frame, from 0; passes of the same group are merged. `None` if it does not run.
     pub group: Option<usize>,
     /// What it reads.
     pub reads: Vec<Use>,
@@ -61,11 +62,12 @@ pub struct Use {
     pub version: u32,
     /// "colour attachment (load)"
     pub access: String,
-    /// The pass that wrote what is read, skipped ones left out; `None` if it comes from outside, or is written here.
+    /// The pass that wrote the content that is read or written over, not counting skipped ones; `None` if the
+    /// content comes from outside or there is none.
     pub from: Option<String>,
 }
 
-/// How a resource lives.
+/// How a resource is realized.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ResourceExplanation {
     /// Its name.
@@ -78,14 +80,14 @@ pub struct ResourceExplanation {
     pub usage: String,
     /// Size in bytes.
     pub bytes: u64,
-    /// The memory it takes turns in with others of the same slot.
+    /// The memory that it uses in turn with other resources of the same slot.
     pub slot: Option<usize>,
-    /// First and last group that use it.
+    /// The first and last group that use it.
     pub lifetime: Option<[usize; 2]>,
 }
 
 impl Plan {
-    /// The plan as data for people and programs.
+    /// Returns the plan as data for people and programs.
     #[must_use]
     pub fn explain(&self) -> Explanation {
         Explanation::of(self)
@@ -148,20 +150,20 @@ impl Explanation {
         }
     }
 
-    /// For people: one line per pass and per resource.
+    /// Formats it for people, with one line per pass and per resource.
     #[must_use]
     pub fn to_text(&self) -> String {
         text::render(self)
     }
 
-    /// For programs.
+    /// Formats it for programs, as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self)
             .expect("only strings, numbers and string keys, which JSON can hold")
     }
 
-    /// For Graphviz: `dot -Tsvg`.
+    /// Formats it for Graphviz: `dot -Tsvg`.
     #[must_use]
     pub fn to_dot(&self) -> String {
         dot::render(self)

@@ -1,4 +1,4 @@
-//! The explanation as text: a table of passes, a table of resources, the memory.
+//! The explanation as text: a table of passes, a table of resources, and the memory use.
 
 use std::fmt::Write;
 
@@ -38,7 +38,7 @@ pub(super) fn render(explanation: &Explanation) -> String {
 
 fn render_pass(text: &mut String, pass: &PassExplanation, width: usize) {
     let group = pass.group.map_or("-".into(), |group| group.to_string());
-    // As a rule a pass is called as its owner.
+    // The owner is only mentioned if it differs from the pass's name, which it usually does not.
     let owner = pass.owner.as_ref().filter(|owner| **owner != pass.name);
     let owner = owner.map_or_else(String::new, |owner| format!(" ({owner}'s)"));
     let _ = writeln!(
@@ -78,7 +78,7 @@ fn render_resource(text: &mut String, resource: &ResourceExplanation, width: usi
     );
 }
 
-/// With three figures and a unit that programmers use.
+/// Formats a number of bytes with one decimal and a binary unit.
 fn bytes(count: u64) -> String {
     const UNITS: [&str; 5] = ["B", "KiB", "MiB", "GiB", "TiB"];
     let mut value = count as f64;

@@ -1,10 +1,11 @@
-//! What a pass gets while it runs: its wgpu pass or encoder, and those resources that it declared, no others.
+//! The context of a running pass: its wgpu pass or encoder, and only the resources that it declared.
 
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::run::error::RunError;
 use crate::run::record::FrameResources;
 
-/// What a pass answers with: nothing, or any error, which the frame's [`RunError::Pass`] carries with the pass's name.
+/// The result of a pass's function: nothing or any error, which becomes the frame's [`RunError::Pass`] with the
+/// pass's name.
 pub type BodyResult = Result<(), BodyError>;
 
 /// Any error of a pass.
@@ -14,20 +15,20 @@ type RasterBody<'a, User> = Box<dyn FnOnce(&mut RasterContext<'_, User>) -> Body
 type ComputeBody<'a, User> = Box<dyn FnOnce(&mut ComputeContext<'_, User>) -> BodyResult + 'a>;
 type TransferBody<'a, User> = Box<dyn FnOnce(&mut TransferContext<'_, User>) -> BodyResult + 'a>;
 
-/// What a pass runs.
+/// The function that a pass runs.
 pub(crate) enum Body<'a, User> {
     Raster(RasterBody<'a, User>),
     Compute(ComputeBody<'a, User>),
     Transfer(TransferBody<'a, User>),
 }
 
-/// Context of a pass that draws. The fields are apart so that they can be borrowed apart.
+/// Context of a pass that draws. Its fields are separate so that they can be borrowed separately.
 pub struct RasterContext<'a, User = ()> {
-    /// The wgpu render pass. Passes that were merged share one: set all state that you rely on.
+    /// The wgpu render pass. Merged passes share one, so set all the state that you rely on.
     pub pass: &'a mut wgpu::RenderPass<'static>,
     /// Device, queue and the declared resources.
     pub resources: PassResources<'a>,
-    /// What the caller lent to [`Executor::execute`](crate::Executor::execute).
+    /// The state that the caller lent to [`Executor::execute_with`](crate::Executor::execute_with).
     pub user: &'a mut User,
 }
 
@@ -37,7 +38,7 @@ pub struct ComputeContext<'a, User = ()> {
     pub pass: &'a mut wgpu::ComputePass<'static>,
     /// Device, queue and the declared resources.
     pub resources: PassResources<'a>,
-    /// What the caller lent to [`Executor::execute`](crate::Executor::execute).
+    /// The state that the caller lent to [`Executor::execute_with`](crate::Executor::execute_with).
     pub user: &'a mut User,
 }
 
@@ -47,16 +48,16 @@ pub struct TransferContext<'a, User = ()> {
     pub encoder: &'a mut wgpu::CommandEncoder,
     /// Device, queue and the declared resources.
     pub resources: PassResources<'a>,
-    /// What the caller lent to [`Executor::execute`](crate::Executor::execute).
+    /// The state that the caller lent to [`Executor::execute_with`](crate::Executor::execute_with).
     pub user: &'a mut User,
 }
 
-/// The resources that a pass declared. Any other is refused with [`RunError::Undeclared`].
+/// The resources that a pass declared. Access to any other fails with [`RunError::Undeclared`].
 #[derive(Clone, Copy)]
 pub struct PassResources<'a> {
     /// The device, for bind groups and pipelines.
     pub device: &'a wgpu::Device,
-    /// The queue. What is written through it is there before any pass of this frame runs.
+    /// The queue. Data written through it arrives before any pass of this frame runs.
     pub queue: &'a wgpu::Queue,
     pub(crate) frame: &'a FrameResources<'a>,
     pub(crate) graph: u64,
@@ -64,15 +65,15 @@ pub struct PassResources<'a> {
 }
 
 impl<'a> PassResources<'a> {
-    /// The view of a declared texture: of the declared part, else of all mip levels and layers.
+    /// Returns the view of a declared texture: of the declared part, or of all mip levels and layers.
     ///
     /// # Errors
-    /// [`RunError::Undeclared`], [`RunError::Absent`] (an optional read of what no pass wrote).
+    /// [`RunError::Undeclared`], or [`RunError::Absent`] for an optional read of a texture that no pass wrote.
     pub fn view(&self, handle: &TextureHandle) -> Result<&'a wgpu::TextureView, RunError> {
         self.frame.view(self, handle)
     }
 
-    /// As [`view`](Self::view), but `None` for an optional read of what no pass wrote.
+    /// The same as [`view`](Self::view), but `None` for an optional read of a texture that no pass wrote.
     ///
     /// # Errors
     /// [`RunError::Undeclared`].
@@ -80,7 +81,7 @@ impl<'a> PassResources<'a> {
         or_absent(self.view(handle))
     }
 
-    /// The texture itself, for copies and for views of one's own.
+    /// Returns the texture itself, for copies and custom views.
     ///
     /// # Errors
     /// As [`view`](Self::view).
@@ -88,7 +89,7 @@ impl<'a> PassResources<'a> {
         self.frame.texture(self, handle)
     }
 
-    /// A declared buffer.
+    /// Returns a declared buffer.
     ///
     /// # Errors
     /// As [`view`](Self::view).
@@ -96,7 +97,7 @@ impl<'a> PassResources<'a> {
         self.frame.buffer(self, handle)
     }
 
-    /// As [`buffer`](Self::buffer), but `None` for an optional read of what no pass wrote.
+    /// The same as [`buffer`](Self::buffer), but `None` for an optional read of a buffer that no pass wrote.
     ///
     /// # Errors
     /// [`RunError::Undeclared`].

@@ -1,10 +1,10 @@
-//! What can go wrong while a compiled graph runs. Faults of the declaration itself are [`GraphError`]s.
+//! What can go wrong while a compiled graph runs. Faults of the declarations are [`GraphError`]s.
 
 use crate::error::{GraphError, did_you_mean};
 use crate::resource::Label;
 use crate::run::context::BodyError;
 
-/// A frame that could not be run.
+/// Why a frame could not be run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "each variant's message says what its fields are")]
@@ -21,15 +21,15 @@ pub enum RunError {
     #[error("pass `{pass}` has nothing to run: end its declaration with .run()")]
     NoBody { pass: Label },
 
-    /// An import that nothing was bound to.
+    /// An import to which nothing is bound.
     #[error("`{resource}` is imported, but nothing is bound to that name{}", did_you_mean(.nearest))]
     ImportNotBound { resource: Label, nearest: Option<Label> },
 
-    /// What is bound is not what was declared.
+    /// The bound resource is not as declared.
     #[error("`{resource}` was imported with {what} {declared}, but what is bound has {bound}")]
     ImportMismatch { resource: Label, what: &'static str, declared: String, bound: String },
 
-    /// What is bound may not be used as the passes use it.
+    /// The bound resource does not allow the usages that the passes need.
     #[error(
         "`{resource}` needs usage {needs} in this graph, but what is bound allows {bound}: create it with the former"
     )]
@@ -51,7 +51,7 @@ pub enum RunError {
     #[error("`{resource}`: {what} of {asked} is more than this device's limit of {limit}")]
     Limit { resource: Label, what: &'static str, asked: u64, limit: u64 },
 
-    /// The device was lost, or took too long, while results were awaited.
+    /// The device was lost, or took too long, while waiting for results.
     #[error("waiting for the GPU's measurements failed: {0}")]
     Wait(String),
 }

@@ -1,10 +1,10 @@
-// Finds the first texel, in reading order, that holds NaN or Inf. IMAGE and SAMPLES are put in by probe.rs.
+// Finds the first texel, in reading order, that has NaN or Inf. probe.rs substitutes IMAGE and SAMPLES.
 //
-// Comparisons with NaN may be assumed away by a driver (WGSL 15.7.1), so the test looks at the exponent's bits: all of
-// them are set in NaN and Inf and in nothing else.
+// A driver may assume that there is no NaN (WGSL 15.7.1) and optimize comparisons away, so the test looks at the
+// bits of the exponent: all of them are set in NaN and Inf and in no other value.
 
 struct Found {
-    // Row-major index of the texel; 0xffffffff if there is none.
+    // Row-major index of the texel, or 0xffffffff if there is none.
     first: atomic<u32>,
     sample_index: u32,
     value: vec4<u32>,

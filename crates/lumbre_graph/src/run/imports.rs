@@ -1,4 +1,4 @@
-//! What the caller binds to a graph's imported resources, and the check that it is what was declared.
+//! What the caller binds to a graph's imported resources, and the check that it is as declared.
 
 use crate::declaration::Declarations;
 use crate::nearest::nearest;
@@ -7,20 +7,20 @@ use crate::resource::{Label, Shape, TextureDescriptor};
 use crate::run::error::RunError;
 use crate::run::pool::{GpuObject, GpuTexture};
 
-/// Textures and buffers by the names they are imported under.
+/// Textures and buffers by the names under which they are imported.
 #[derive(Clone, Default)]
 pub struct Imports {
     bound: Vec<(Label, GpuObject)>,
 }
 
 impl Imports {
-    /// Nothing bound.
+    /// Creates imports with nothing bound.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Binds the texture of a view. Passes get this very view; other parts of the texture get views of their own.
+    /// Binds the texture of a view. Passes get this very view; single parts of the texture get their own views.
     #[must_use]
     pub fn texture(mut self, name: impl Into<Label>, view: &wgpu::TextureView) -> Self {
         let texture = GpuTexture { texture: view.texture().clone(), view: view.clone(), parts: Vec::new() };
@@ -35,7 +35,7 @@ impl Imports {
         self
     }
 
-    /// What is bound to resource `index`, which needs to be as `shape` says.
+    /// Returns what is bound to resource `index`, which must match `shape`.
     pub(crate) fn find(
         &self,
         declarations: &Declarations,
@@ -74,7 +74,7 @@ impl Imports {
 }
 
 fn texture(name: &Label, bound: &wgpu::Texture, declared: &TextureDescriptor) -> Result<(), RunError> {
-    // A view may show an sRGB texture as linear and the other way round; the texels are the same.
+    // The declared format may differ in its sRGB suffix, as a view may reinterpret the texels that way.
     if bound.format().remove_srgb_suffix() != declared.format.remove_srgb_suffix() {
         let (declared, bound) = (format!("{:?}", declared.format), format!("{:?}", bound.format()));
         return Err(mismatch(name, "format", declared, bound));

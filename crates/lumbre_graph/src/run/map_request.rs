@@ -1,16 +1,17 @@
-//! Asking for a buffer's bytes in memory. wgpu answers from whichever thread polls the device: one thread may find
-//! nothing left to poll for while another is still on its way to the answer, so the answer itself is what is waited for.
+//! Requests to map a buffer for reading. wgpu calls back on whichever thread polls the device. A thread may find
+//! nothing left to poll for while another thread has not run the callback yet, so a request waits for the callback
+//! itself.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// How long an answer may take that another thread holds in its hand, before it is given up.
+/// How long to wait for a callback that another thread has yet to run.
 const LONGEST_HANDOVER: Duration = Duration::from_secs(10);
 
-/// What became of a [`MapRequest`].
+/// The state of a [`MapRequest`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MapState {
-    /// Nothing is known yet.
+    /// Not answered yet.
     #[default]
     Waiting,
     /// The buffer is mapped.
@@ -19,12 +20,12 @@ pub enum MapState {
     Failed,
 }
 
-/// A buffer that was asked for, to be read by this program once the GPU has written it.
+/// A request to map a buffer, so that the program can read it once the GPU has written it.
 #[derive(Clone, Debug, Default)]
 pub struct MapRequest(Arc<(Mutex<MapState>, Condvar)>);
 
 impl MapRequest {
-    /// Asks for the whole of a buffer, to be read. It is answered while the device is polled, by any thread.
+    /// Requests to map a whole buffer for reading. The request is answered while any thread polls the device.
     #[must_use]
     pub fn new(buffer: &wgpu::Buffer) -> Self {
         let request = Self::default();
@@ -36,14 +37,14 @@ impl MapRequest {
         request
     }
 
-    /// What is known now; does not wait.
+    /// Returns the current state without waiting.
     #[must_use]
     pub fn state(&self) -> MapState {
         *self.lock()
     }
 
-    /// Waits for the answer, after the device was polled until the buffer's submission was done: by then some thread has
-    /// the answer. [`MapState::Waiting`] only if that thread stood still for ten seconds.
+    /// Waits for the answer. Call it after polling the device until the buffer's submission was done; some thread
+    /// then has the answer. The result is only [`MapState::Waiting`] if that thread is stuck for ten seconds.
     #[must_use]
     pub fn wait(&self) -> MapState {
         let (state, _) = self

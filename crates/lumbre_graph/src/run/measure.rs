@@ -1,14 +1,14 @@
-//! Queries and their way back. Results arrive some frames later through a ring of buffers, so that measuring never
-//! makes the CPU wait; whoever wants to wait can.
+//! Queries and the readback of their results. Results arrive some frames later through a ring of buffers, so that
+//! measuring never makes the CPU wait unless the caller wants to.
 
 use crate::run::map_request::{MapRequest, MapState};
 use crate::run::probe::{self, Probed};
 use crate::run::report::{GpuTime, GraphReport, Invocations, Measurements};
 
-/// Frames whose results may be on their way at once. A frame beyond that is not measured on the GPU.
+/// Number of frames whose results may be in flight at once. Further frames are not measured on the GPU.
 const RING: usize = 4;
 
-/// What is counted, in the order in which the results lie in memory (that of the flags' bits).
+/// The statistics that are counted, in the order of their results in memory (that of the flags' bits).
 const STATISTICS: wgpu::PipelineStatisticsTypes = wgpu::PipelineStatisticsTypes::VERTEX_SHADER_INVOCATIONS
     .union(wgpu::PipelineStatisticsTypes::FRAGMENT_SHADER_INVOCATIONS)
     .union(wgpu::PipelineStatisticsTypes::COMPUTE_SHADER_INVOCATIONS);
@@ -21,21 +21,21 @@ pub(crate) struct FrameQueries {
     capacity: [u32; 2],
     resolve: Option<wgpu::Buffer>,
     readback: Option<wgpu::Buffer>,
-    /// Queries handed out in this frame.
+    /// Numbers of timestamp and statistics queries used in this frame.
     used: [u32; 2],
     /// Whether timestamps can be written inside passes, and on the encoder.
     pub inside_passes: bool,
     pub inside_encoders: bool,
-    /// Per pass of the report: first and last timestamp, and whose time that is.
+    /// For each pass of the report its first and last timestamp, and what they enclose.
     pub spans: Vec<Option<(u32, u32, Scope)>>,
-    /// Per pass of the report: its statistics query.
+    /// For each pass of the report its statistics query.
     pub counts: Vec<Option<u32>>,
     pub probed: Vec<Probed>,
     pub report: GraphReport,
     request: MapRequest,
 }
 
-/// Whose time lies between two timestamps.
+/// What lies between two timestamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Scope {
     Pass,
@@ -62,12 +62,12 @@ impl FrameQueries {
         }
     }
 
-    /// A timestamp to write, if there are any.
+    /// Allocates a timestamp query, if one is left.
     pub fn timestamp(&mut self) -> Option<u32> {
         take(&mut self.used[0], self.capacity[0])
     }
 
-    /// A statistics query to make, if there are any.
+    /// Allocates a statistics query, if one is left.
     pub fn statistic(&mut self) -> Option<u32> {
         take(&mut self.used[1], self.capacity[1])
     }
@@ -118,8 +118,8 @@ impl FrameQueries {
         }
     }
 
-    /// Bytes of timestamps, statistics and probe results in the readback buffer, each on a boundary that a resolve
-    /// may begin at.
+    /// Bytes of timestamps, statistics and probe results in the readback buffer; the first two are aligned so that
+    /// a resolve may begin after them.
     fn layout(&self) -> [u64; 3] {
         let align = |bytes: u64| bytes.next_multiple_of(wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT);
         [
@@ -129,7 +129,7 @@ impl FrameQueries {
         ]
     }
 
-    /// Records the way back of all that was measured. Answers whether anything was.
+    /// Records the resolve and readback of everything that was measured. Returns true if anything was.
     pub fn resolve(
         &mut self,
         device: &wgpu::Device,
@@ -170,14 +170,14 @@ impl FrameQueries {
         true
     }
 
-    /// After the submission: asks for the results.
+    /// Requests the results, after the submission.
     fn send_for(&mut self) {
         if let Some(readback) = &self.readback {
             self.request = MapRequest::new(readback);
         }
     }
 
-    /// The report with what arrived.
+    /// Returns the report with the results that arrived.
     fn read(&mut self, period: f64) -> GraphReport {
         let mut report = std::mem::take(&mut self.report);
         let layout = self.layout();
@@ -210,7 +210,7 @@ impl FrameQueries {
     }
 
     fn times(&self, report: &mut GraphReport, stamps: &[u64], period: f64) {
-        // A clock that was reset between two stamps gives no time rather than a huge one.
+        // If the clock was reset between two timestamps, the time is 0 and not a huge number.
         let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * period * 1e-6;
         for (pass, span) in report.passes.iter_mut().zip(&self.spans) {
             let Some((from, to, scope)) = *span else { continue };
@@ -240,7 +240,7 @@ fn words(bytes: &[u8]) -> Vec<u64> {
     bytes.as_chunks().0.iter().map(|word| u64::from_le_bytes(*word)).collect()
 }
 
-/// Frames on their way.
+/// Frames whose results are in flight.
 #[derive(Default)]
 pub(crate) struct Ring {
     free: Vec<FrameQueries>,
@@ -249,7 +249,7 @@ pub(crate) struct Ring {
 }
 
 impl Ring {
-    /// Queries for a frame. If too many are on their way they are without any.
+    /// Returns the queries for a frame. If too many frames are in flight, it is not measured on the GPU.
     pub fn begin(
         &mut self,
         device: &wgpu::Device,
@@ -268,7 +268,8 @@ impl Ring {
         queries
     }
 
-    /// Sends for a frame's results after its submission, or answers with the report at once if it has none to wait for.
+    /// Requests a frame's results after its submission, or returns its report at once if there are none to wait
+    /// for.
     pub fn end(&mut self, mut queries: FrameQueries, to_wait_for: bool) -> Option<GraphReport> {
         if to_wait_for {
             queries.send_for();
@@ -280,17 +281,17 @@ impl Ring {
         Some(report)
     }
 
-    /// Whether any frame is on its way.
+    /// Returns true if the results of any frame are in flight.
     pub fn is_waiting(&self) -> bool {
         !self.waiting.is_empty()
     }
 
-    /// Whether a frame more may be probed.
+    /// Returns true if one more frame may be probed.
     pub fn has_room(&self) -> bool {
         self.waiting.len() < RING
     }
 
-    /// Waits for the answers to all that was sent for, after the device was polled to the end.
+    /// Waits for the answers to all requests, after the device was polled to the end.
     pub fn wait(&self) {
         for frame in &self.waiting {
             if frame.request.wait() == MapState::Waiting {
@@ -299,7 +300,7 @@ impl Ring {
         }
     }
 
-    /// The newest report that arrived.
+    /// Returns the newest report that has arrived.
     pub fn collect(&mut self, period: f64) -> Option<GraphReport> {
         let mut newest = None;
         while let Some(first) = self.waiting.first()

@@ -1,4 +1,5 @@
-//! Running a compiled graph on wgpu: memory, commands, time. What runs and in which order is the plan's decision.
+//! Running a compiled graph on wgpu: memory, commands and measurements. What runs and in which order is decided by
+//! the plan.
 
 pub(crate) mod context;
 pub(crate) mod error;

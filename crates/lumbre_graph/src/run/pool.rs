@@ -1,4 +1,4 @@
-//! GPU memory of a graph: transients by shape, used again frame after frame, and retained resources by name.
+//! GPU memory of a graph: transient resources by shape, reused from frame to frame, and retained resources by name.
 
 use std::collections::HashMap;
 
@@ -6,20 +6,21 @@ use crate::access::Part;
 use crate::resource::{Label, Shape, TextureDescriptor};
 use crate::run::error::RunError;
 
-/// Frames after which memory that no graph asked for is given back. A few, so that a pass that comes and goes every
-/// other frame does not allocate each time.
+/// Number of frames after which transient memory that no graph used is freed. It is a few frames, so that a pass
+/// that runs every other frame does not cause an allocation each time.
 pub const KEEP_TRANSIENT_FRAMES: u64 = 4;
 
-/// Frames after which a retained resource that no graph declared is dropped: one second at 60 frames per second.
+/// Number of frames after which a retained resource that no graph declared is dropped: one second at 60 frames per
+/// second.
 pub const KEEP_RETAINED_FRAMES: u64 = 60;
 
 /// A texture with its views.
 #[derive(Clone)]
 pub(crate) struct GpuTexture {
     pub texture: wgpu::Texture,
-    /// Of the whole.
+    /// View of the whole texture.
     pub view: wgpu::TextureView,
-    /// Of single parts, made when first asked for.
+    /// Views of single parts, created on first use.
     pub parts: Vec<(Part, wgpu::TextureView)>,
 }
 
@@ -39,7 +40,7 @@ impl GpuTexture {
         Self { texture, view, parts: Vec::new() }
     }
 
-    /// The view of one part, made if there is none yet.
+    /// Returns the view of one part, which is created on first use.
     pub fn part(&mut self, part: Part) -> &wgpu::TextureView {
         let found = self.parts.iter().position(|(held, _)| *held == part);
         let index = found.unwrap_or_else(|| {
@@ -59,7 +60,7 @@ impl GpuTexture {
     }
 }
 
-/// A texture or a buffer. Cloning clones a reference.
+/// A texture or a buffer; cloning it clones a reference.
 #[derive(Clone)]
 pub(crate) enum GpuObject {
     Texture(GpuTexture),
@@ -72,14 +73,14 @@ struct Entry {
     used_in: u64,
 }
 
-/// Counts of what the pool holds and did.
+/// Counts of the pool's objects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PoolStatistics {
-    /// Textures and buffers created since the start, retained ones too.
+    /// Textures and buffers created since the start, including retained ones.
     pub created: u64,
-    /// Transient textures and buffers held now.
+    /// Transient textures and buffers that exist now.
     pub transients: usize,
-    /// Retained textures and buffers held now.
+    /// Retained textures and buffers that exist now.
     pub retained: usize,
     /// Bytes of both.
     pub bytes: u64,
@@ -93,7 +94,7 @@ pub(crate) struct Pool {
 }
 
 impl Pool {
-    /// Memory of this shape that nothing else uses in this frame.
+    /// Returns memory of this shape that nothing else uses in this frame.
     pub fn transient(
         &mut self,
         device: &wgpu::Device,
@@ -115,7 +116,7 @@ impl Pool {
         Ok(&mut entry.object)
     }
 
-    /// The retained resource of this name, and whether it was made just now: then it holds nothing.
+    /// Returns the retained resource with this name, and whether it was only just created and so has no content.
     pub fn retained(
         &mut self,
         device: &wgpu::Device,
@@ -133,7 +134,7 @@ impl Pool {
         Ok((&mut entry.object, fresh))
     }
 
-    /// Gives back what was not used for long. Answers with the names of dropped retained resources.
+    /// Frees what has not been used for long. Returns the names of the retained resources that were dropped.
     pub fn trim(&mut self, frame: u64) -> Vec<Label> {
         self.transients.retain(|entry| frame - entry.used_in < KEEP_TRANSIENT_FRAMES);
         let old = |entry: &Entry| frame - entry.used_in >= KEEP_RETAINED_FRAMES;
@@ -170,7 +171,7 @@ impl Pool {
     }
 }
 
-/// wgpu ends the program at a resource beyond the device's limits; this names it instead.
+/// Returns an error that names a resource beyond the device's limits, where wgpu would panic.
 fn check_limits(limits: &wgpu::Limits, name: &Label, shape: &Shape) -> Result<(), RunError> {
     let check = |what: &'static str, asked: u64, limit: u64| {
         if asked <= limit {

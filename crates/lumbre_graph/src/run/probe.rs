@@ -1,31 +1,31 @@
-//! The finite-value probe: looks at every float texture after the pass that wrote it, and names the first pass and
-//! texel that hold NaN or Inf. It does not look into buffers or 3D textures, and formats that can hold neither value
-//! (normalized, integer, depth, shared exponent) are not looked at.
+//! The finite-value probe: inspects every float texture after the pass that wrote it, and names the first pass and
+//! texel with NaN or Inf. It does not inspect buffers, 3D textures, or formats that can hold neither value
+//! (normalized, integer, depth, shared exponent).
 
 use crate::access::Part;
 use crate::resource::Label;
 use crate::run::report::NonFinite;
 
-/// Bytes from one result to the next: the largest alignment that a device may ask of a storage buffer's offset.
+/// Bytes from one result to the next: the largest alignment that a device may require of a storage buffer's offset.
 pub(crate) const STRIDE: u64 = 256;
 
-/// Bytes of one result: `Found` in finite_probe.wgsl.
+/// Bytes of one result, which is `Found` in finite_probe.wgsl.
 const RESULT_BYTES: u64 = 32;
 
-/// `first` of a result without find.
+/// The value of `first` in a result if nothing was found.
 const NONE: u32 = u32::MAX;
 
-/// One look at one part of a texture after one pass.
+/// One inspection of one part of a texture after one pass.
 #[derive(Clone, Debug)]
 pub(crate) struct Probed {
     pub pass: Label,
     pub resource: Label,
     pub part: Part,
-    /// In texels, to make a column and a row of the index.
+    /// Width in texels, which turns the index into a column and a row.
     pub width: u32,
 }
 
-/// The find of the earliest look that has one.
+/// Returns what the earliest inspection with a find has found.
 pub(crate) fn first(probed: &[Probed], bytes: &[u8]) -> Option<NonFinite> {
     let word = |at: usize| {
         let chunk = bytes.get(at..).and_then(<[u8]>::first_chunk::<4>);
@@ -53,7 +53,7 @@ struct Pipelines {
     fetch: wgpu::ComputePipeline,
 }
 
-/// Records looks into textures. Made when first switched on.
+/// Records inspections of textures. Created when first switched on.
 pub struct FiniteProbe {
     single: Pipelines,
     multisampled: Pipelines,
@@ -61,7 +61,7 @@ pub struct FiniteProbe {
 }
 
 impl FiniteProbe {
-    /// The probe's pipelines, with room for `looks` results.
+    /// Creates the probe's pipelines, with room for `looks` results.
     pub(crate) fn new(device: &wgpu::Device, looks: usize) -> Self {
         Self {
             single: pipelines(device, "texture_2d<f32>", "1u", false),
@@ -70,7 +70,7 @@ impl FiniteProbe {
         }
     }
 
-    /// Makes room for `looks` results and empties them, before the frame's first pass runs.
+    /// Makes room for `looks` results and resets them, before the frame's first pass runs.
     pub(crate) fn begin(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, looks: usize) {
         if self.results.size() < looks as u64 * STRIDE {
             self.results = results(device, looks);
@@ -82,7 +82,7 @@ impl FiniteProbe {
         &self.results
     }
 
-    /// Records look number `index` at a view of one part, of this size in texels.
+    /// Records inspection number `index`, of a view of one part with this size in texels.
     pub(crate) fn look(
         &self,
         device: &wgpu::Device,
@@ -129,7 +129,7 @@ fn results(device: &wgpu::Device, looks: usize) -> wgpu::Buffer {
 
 fn pipelines(device: &wgpu::Device, image: &str, samples: &str, multisampled: bool) -> Pipelines {
     let source = include_str!("finite_probe.wgsl").replace("IMAGE", image).replace("SAMPLES", samples);
-    // The header's mention of the two words is replaced too, which a comment can bear.
+    // This also replaces the two words in the header comment, which does no harm.
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("finite probe"),
         source: wgpu::ShaderSource::Wgsl(source.into()),

@@ -17,7 +17,7 @@ use crate::run::report::{GpuTime, PassReport};
 /// The GPU objects behind the resources of one frame.
 pub(crate) struct FrameResources<'p> {
     pub plan: &'p Plan,
-    /// Per resource; `None` for those that no pass that runs uses.
+    /// Per resource; `None` for transient and imported resources that no running pass uses.
     pub objects: Vec<Option<GpuObject>>,
 }
 
@@ -52,7 +52,7 @@ impl FrameResources<'_> {
         }
     }
 
-    /// The declaration that lets this pass at this version; reading goes before writing, if there are both.
+    /// Returns the declaration that gives this pass access to this version; a read takes precedence over a write.
     fn declared<K>(
         &self,
         pass: &PassResources<'_>,
@@ -81,8 +81,8 @@ impl FrameResources<'_> {
                 declared: if versions.is_empty() { "none of it".into() } else { versions.join(", ") },
             });
         };
-        // An optional read of a transient that a skipped pass would have written: its memory may be there for
-        // another version, but holds nothing that this pass may see.
+        // For an optional read of a transient resource that a skipped pass would have written, there may be memory
+        // because of another version, but no content that this pass may see.
         let standing = self.plan.effective[found.resource][found.version as usize];
         if found.optional && standing == 0 && !self.plan.initial[found.resource] {
             return Err(self.absent(pass, found));
@@ -116,12 +116,13 @@ impl FrameResources<'_> {
     }
 }
 
-/// The view of a part. All parts that are used were made with the object; a texture of one part is its own.
+/// Returns the view of a part. The views of all parts that are used were created with the object; a texture with
+/// one part only has its whole view.
 fn part_view(texture: &GpuTexture, part: Part) -> &wgpu::TextureView {
     texture.parts.iter().find(|(held, _)| *held == part).map_or(&texture.view, |(_, view)| view)
 }
 
-/// The looks that the probe takes after a step: the parts of float textures that its pass wrote.
+/// Returns what the probe inspects after a step: the parts of float textures that its passes wrote.
 pub(crate) fn looks(plan: &Plan, step: &Step) -> Vec<(usize, Part)> {
     let mut looks = Vec::new();
     for &pass in &step.passes {
@@ -133,7 +134,8 @@ pub(crate) fn looks(plan: &Plan, step: &Step) -> Vec<(usize, Part)> {
             let (Shape::Texture(texture), Shape::Texture(described)) = (planned.shape, resource.shape) else {
                 continue;
             };
-            // Whether an imported texture may be looked at is its maker's word: what the passes need of it is no answer.
+            // An imported texture can only be inspected if its declaration allows that; the usages that the passes
+            // need do not tell.
             let bindable = described.usage.contains(wgpu::TextureUsages::TEXTURE_BINDING);
             if !texture.can_be_probed() || planned.lifetime.is_none() || (imported && !bindable) {
                 continue;
@@ -149,7 +151,7 @@ pub(crate) fn looks(plan: &Plan, step: &Step) -> Vec<(usize, Part)> {
     looks
 }
 
-/// Records steps.
+/// Records the steps of a frame.
 pub(crate) struct Recorder<'r, 'a, User> {
     pub device: &'r wgpu::Device,
     pub queue: &'r wgpu::Queue,
@@ -210,7 +212,7 @@ impl<'r, User> Recorder<'r, '_, User> {
                 stencil_ops: None,
             })
         });
-        // Asked for one after the other: they must lie in order.
+        // Allocated together before the pass begins, so that they are in order.
         let inner = if self.queries.inside_passes { step.passes.len() - 1 } else { 0 };
         let stamps: Vec<Option<u32>> = (0..inner + 2).map(|_| self.queries.timestamp()).collect();
         let timestamps = self.queries.timestamps.clone();

@@ -2,23 +2,23 @@
 
 use crate::resource::Label;
 
-/// What to measure. Each has a cost; [`Measurements::OFF`] has none.
+/// What to measure. Each measurement has a cost; [`Measurements::OFF`] has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Measurements {
-    /// Time that recording each pass takes on the CPU.
+    /// Time for recording each pass on the CPU.
     pub cpu: bool,
-    /// Time that each pass takes on the GPU, where the device has `TIMESTAMP_QUERY`.
+    /// Time of each pass on the GPU, if the device has `TIMESTAMP_QUERY`.
     pub gpu: bool,
-    /// Vertex, fragment and compute invocations, where the device has `PIPELINE_STATISTICS_QUERY`.
+    /// Vertex, fragment and compute invocations, if the device has `PIPELINE_STATISTICS_QUERY`.
     pub statistics: bool,
 }
 
 impl Measurements {
-    /// Nothing.
+    /// Measures nothing.
     pub const OFF: Self = Self { cpu: false, gpu: false, statistics: false };
-    /// Times only.
+    /// Measures times only.
     pub const TIMES: Self = Self { cpu: true, gpu: true, statistics: false };
-    /// Everything.
+    /// Measures everything.
     pub const ALL: Self = Self { cpu: true, gpu: true, statistics: true };
 }
 
@@ -28,25 +28,25 @@ impl Default for Measurements {
     }
 }
 
-/// Time on the GPU.
+/// Time on the GPU, and what it is the time of.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(tag = "scope", rename_all = "snake_case")]
 pub enum GpuTime {
-    /// Not asked for, or the device can not tell.
+    /// Not requested, or the device cannot measure it.
     NotMeasured,
     /// Of this pass alone.
     Pass {
         /// Milliseconds.
         ms: f64,
     },
-    /// Of a part of a render pass shared with others. On tile-based GPUs and software rasterizers, which draw all of
-    /// a render pass tile by tile, this says little; to compare such passes switch merging off
+    /// Of one part of a render pass that is shared with others. On tile-based GPUs and software rasterizers, which
+    /// draw a whole render pass tile by tile, this means little; to compare such passes switch merging off
     /// ([`Executor::set_merging`](crate::Executor::set_merging)).
     PartOfGroup {
         /// Milliseconds.
         ms: f64,
     },
-    /// Of the whole group of merged passes, the same for each of them: the device has no
+    /// Of a whole group of merged passes, and the same for each of them, because the device has no
     /// `TIMESTAMP_QUERY_INSIDE_PASSES`.
     Group {
         /// Milliseconds.
@@ -55,7 +55,7 @@ pub enum GpuTime {
 }
 
 impl GpuTime {
-    /// Milliseconds, whatever they are of.
+    /// Returns the milliseconds, regardless of what they are the time of.
     #[must_use]
     pub fn ms(self) -> Option<f64> {
         match self {
@@ -68,33 +68,33 @@ impl GpuTime {
 /// Shader invocations of one pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Invocations {
-    /// Of the vertex stage.
+    /// Invocations of the vertex stage.
     pub vertex: u64,
-    /// Of the fragment stage.
+    /// Invocations of the fragment stage.
     pub fragment: u64,
-    /// Of the compute stage.
+    /// Invocations of the compute stage.
     pub compute: u64,
 }
 
-/// Milliseconds on the CPU of one execution, stage after stage: each begins where the one before ends.
+/// CPU time in milliseconds of the stages of one execution; each begins where the previous one ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct ExecutionStages {
-    /// Results of earlier frames that have arrived.
+    /// Collecting the results of earlier frames that have arrived.
     pub collecting_ms: f64,
     /// Compiling the graph, or finding the plan of an equal one.
     pub planning_ms: f64,
-    /// Memory of transient and retained resources, imports, queries.
+    /// Providing transient and retained resources, imports and queries.
     pub resources_ms: f64,
-    /// The commands of all passes.
+    /// Recording the commands of all passes.
     pub recording_ms: f64,
-    /// Handing them to the queue.
+    /// Submitting the commands to the queue.
     pub submission_ms: f64,
-    /// What is kept for the next frame.
+    /// Updating what is kept for the next frame.
     pub keeping_ms: f64,
 }
 
 impl ExecutionStages {
-    /// All of them.
+    /// Returns the sum of all stages.
     #[must_use]
     pub fn total_ms(&self) -> f64 {
         let Self { collecting_ms, planning_ms, resources_ms, recording_ms, submission_ms, keeping_ms } = self;
@@ -102,16 +102,17 @@ impl ExecutionStages {
     }
 }
 
-/// What was measured of one pass.
+/// What was measured for one pass.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct PassReport {
-    /// The pass.
+    /// The pass's name.
     pub name: Label,
-    /// The part of the program that declared it, if the graph was told ([`Graph::set_owner`](crate::Graph::set_owner)).
+    /// The part of the program that declared it, if the graph knows it
+    /// ([`Graph::set_owner`](crate::Graph::set_owner)).
     pub owner: Option<Label>,
-    /// The wgpu pass of the frame it was in, from 0. Passes of the same group were merged.
+    /// Index of its wgpu pass in the frame, from 0. Passes of the same group were merged.
     pub group: usize,
-    /// Milliseconds that recording it took on the CPU.
+    /// Milliseconds for recording it on the CPU.
     pub cpu_ms: Option<f64>,
     /// Time on the GPU.
     pub gpu: GpuTime,
@@ -122,9 +123,9 @@ pub struct PassReport {
 /// The first value of a frame that is NaN or infinite.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct NonFinite {
-    /// The first pass after which it was there.
+    /// The first pass after which the value was there.
     pub pass: Label,
-    /// The texture that it is in.
+    /// The texture that contains it.
     pub resource: Label,
     /// Mip level.
     pub mip: u32,
@@ -136,39 +137,40 @@ pub struct NonFinite {
     pub y: u32,
     /// Sample within the texel, 0 unless multisampled.
     pub sample: u32,
-    /// The texel, for looking at. (JSON has no NaN; they are `null` there.)
+    /// The texel's value. (JSON has no NaN; such channels are `null` there.)
     pub value: [f32; 4],
 }
 
-/// What a frame measured, all of the same frame.
+/// What was measured in one frame.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct GraphReport {
-    /// The frame, counted from 1 by the executor.
+    /// The number of the frame, counted from 1 by the executor.
     pub frame: u64,
-    /// Milliseconds on the CPU until the frame was submitted: of the whole of `execute`, and of what came before it since
+    /// CPU time in milliseconds until the frame was submitted: all of `execute`, and the time before it since
     /// `Executor::begun_at`.
     pub cpu_ms: Option<f64>,
-    /// Milliseconds from the first pass's begin to the last one's end on the GPU.
+    /// GPU time in milliseconds from the beginning of the first pass to the end of the last one.
     pub gpu_ms: Option<f64>,
     /// The passes that ran, in order.
     pub passes: Vec<PassReport>,
     /// The first value that is not finite, if the probe was on and found one.
     pub non_finite: Option<NonFinite>,
-    /// Whether the probe was on and there was a texture that it could look at.
+    /// Whether the probe was on and there was a texture that it could inspect.
     pub probed: bool,
     /// What could not be measured, and why.
     pub notes: Vec<String>,
 }
 
 impl GraphReport {
-    /// Milliseconds on the GPU of all passes, each wgpu pass counted once; `None` if none was measured. The rest of [`gpu_ms`](Self::gpu_ms) lies between them.
+    /// Returns the GPU time in milliseconds of all passes, with each wgpu pass counted once; `None` if none was
+    /// measured. The rest of [`gpu_ms`](Self::gpu_ms) is spent between them.
     #[must_use]
     pub fn passes_gpu_ms(&self) -> Option<f64> {
         let mut counted = None;
         let mut sum = None;
         for pass in &self.passes {
             let shared = matches!(pass.gpu, GpuTime::Group { .. });
-            // The same time stands at every pass of the group, and these follow each other.
+            // All passes of the group have the same time, and they are consecutive.
             if shared && counted == Some(pass.group) {
                 continue;
             }

@@ -23,7 +23,7 @@ impl Sequence {
         DVec3::new(radius * cosine, z, radius * sine)
     }
 
-    /// A polygon of about a metre, `distance` metres from the origin, which is before its front.
+    /// A polygon of about a metre, `distance` metres from the origin, which is in front of it.
     fn polygon(&mut self, distance: f64) -> PolygonLight {
         let (edge_u, edge_v) = (self.unit(), 0.7 * self.unit());
         let mut away = self.unit();
@@ -45,12 +45,12 @@ fn rectangle(corner: [f64; 3], edge_u: [f64; 3], edge_v: [f64; 3]) -> PolygonLig
     PolygonLight { corner, edge_u, edge_v, triangle: false, radiance: DVec3::ONE }
 }
 
-/// 2 m by 2 m, `height` above the origin, facing down.
+/// A panel of 2 m by 2 m, `height` above the origin, facing down.
 fn ceiling(height: f64) -> PolygonLight {
     rectangle([-1.0, height, -1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0])
 }
 
-/// Lambert's formula as the books have it: clip, then sum θ n·Γ with arc tangents.
+/// Lambert's formula in its textbook form: clip, then sum θ n·Γ with arc tangents.
 fn lambert_formula(light: &PolygonLight, point: DVec3, normal: DVec3) -> f64 {
     let mut corners = vec![light.corner, light.corner + light.edge_u];
     if !light.triangle {
@@ -81,7 +81,7 @@ fn lambert_formula(light: &PolygonLight, point: DVec3, normal: DVec3) -> f64 {
     (-above.iter().enumerate().map(term).sum::<f64>() / TAU).clamp(0.0, 1.0)
 }
 
-/// ∫ cos θ cos θ' / (π d²) dA by n x n midpoints.
+/// ∫ cos θ cos θ' / (π d²) dA, by n x n midpoints.
 fn integrated(light: &PolygonLight, point: DVec3, normal: DVec3, n: usize) -> f64 {
     let area_vector = light.edge_u.cross(light.edge_v);
     let mut sum = 0.0;
@@ -103,11 +103,11 @@ fn element_to_rectangle_in_closed_form() {
     let corner = rectangle([0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
     assert!((factor(&corner, DVec3::ZERO, DVec3::Y) - 0.138531605994893).abs() < 1e-14);
     assert!((factor(&ceiling(1.0), DVec3::ZERO, DVec3::Y) - 0.554126423979572).abs() < 1e-14);
-    // Perpendicular, beginning at the element's own height.
+    // A perpendicular rectangle, beginning at the element's own height.
     assert!((factor(&corner, DVec3::ZERO, DVec3::Z) - 0.0557341970025535).abs() < 1e-14);
-    // The horizon cuts the second in halves, so from twice its area one of them is left.
+    // The horizon cuts the panel into halves, one of which is visible, with twice the area of `corner`.
     assert!((factor(&ceiling(1.0), DVec3::ZERO, DVec3::Z) - 2.0 * 0.0557341970025535).abs() < 1e-14);
-    // The Cornell box: lamp 130 by 105 at height 548.8, element under its middle; E/L = π F.
+    // The lamp of the Cornell box, 130 by 105 at height 548.8, with the element under its middle; E/L = π F.
     let lamp = rectangle([-65.0, 548.8, -52.5], [130.0, 0.0, 0.0], [0.0, 0.0, 105.0]);
     let irradiance_over_radiance = PI * factor(&lamp, DVec3::ZERO, DVec3::Y);
     assert!((irradiance_over_radiance - 0.0446324746681278).abs() < 1e-15, "{irradiance_over_radiance}");
@@ -124,7 +124,8 @@ fn clipped_polygons_by_numeric_integration() {
         cut += u32::from(ends.iter().any(|h| *h > 0.0) && ends.iter().any(|h| *h < 0.0));
         let found = factor(&light, DVec3::ZERO, normal);
         let expected = integrated(&light, DVec3::ZERO, normal, 400);
-        // Midpoints: h² of a bounded second derivative, and the strip along the horizon or a triangle's edge.
+        // The midpoint rule's h² times a bounded second derivative, and the strip along the horizon or a triangle's
+        // edge.
         assert!((found - expected).abs() < 3e-4, "{found} {expected} {light:?}");
     }
     assert!(cut > 10, "only {cut} polygons are cut by the horizon");
@@ -138,7 +139,7 @@ fn equals_the_formula_of_the_books() {
         let normal = sequence.unit();
         let (found, expected) =
             (factor(&light, DVec3::ZERO, normal), lambert_formula(&light, DVec3::ZERO, normal));
-        // The book's sum cancels to about 2⁻⁵³ absolute; corners near the point have large derivatives.
+        // The textbook sum cancels to about 2⁻⁵³ absolute; corners near the point have large derivatives.
         assert!((found - expected).abs() < 2e-13, "{step}: {found:e} {expected:e} {light:?}");
     }
 }
@@ -153,7 +154,7 @@ fn far_away_it_is_a_point_light() {
         let normal = (to_light + 0.8 * sequence.unit()).normalize();
         let expected = -light.area_vector().dot(to_light) * normal.dot(to_light) / (PI * distance * distance);
         let found = factor(&light, DVec3::ZERO, normal);
-        // The polygon is 1e-6 of the distance wide, and off its middle by as much.
+        // The polygon's width is 1e-6 of the distance, and its middle is off by as much.
         assert!((found - expected).abs() <= 1e-5 / (PI * distance * distance), "{found:e} {expected:e}");
     }
 }
@@ -179,7 +180,7 @@ fn linear_in_radiance_and_the_sum_of_its_parts() {
             assert_eq!(one.ambient, DVec3::ZERO);
             assert_eq!((one.diffuse * 2.0, one.specular * 2.0), (twice.diffuse, twice.specular));
         }
-        // A parallelogram's two triangles, and its two halves.
+        // A parallelogram as two triangles and as two halves.
         let whole = PolygonLight { triangle: false, ..light };
         let first = PolygonLight { triangle: true, ..light };
         let second = PolygonLight {
@@ -220,7 +221,7 @@ fn rotation_and_scale_change_nothing() {
 #[test]
 fn where_there_is_no_light_there_is_none() {
     let panel = ceiling(1.0);
-    // Behind, in its plane, below the horizon, no normal.
+    // Points behind the panel, in its plane, with the panel below the horizon, and without a normal.
     assert_eq!(factor(&panel, DVec3::new(0.0, 2.0, 0.0), -DVec3::Y), 0.0);
     assert_eq!(factor(&panel, DVec3::new(3.0, 1.0, 0.0), -DVec3::Y), 0.0);
     assert_eq!(factor(&panel, DVec3::new(0.2, 1.0, 0.1), DVec3::Y), 0.0);
@@ -228,7 +229,7 @@ fn where_there_is_no_light_there_is_none() {
     assert_eq!(factor(&panel, DVec3::ZERO, DVec3::ZERO), 0.0);
     assert_eq!(factor(&panel.turned(), DVec3::ZERO, DVec3::Y), 0.0);
     assert!(factor(&panel.turned(), DVec3::new(0.0, 2.0, 0.0), -DVec3::Y) > 0.5);
-    // Touching: all of the hemisphere.
+    // Almost touching, the panel covers the hemisphere.
     assert!((factor(&panel, DVec3::new(0.3, 1.0 - 1e-9, 0.2), DVec3::Y) - 1.0).abs() < 1e-8);
 }
 
@@ -261,7 +262,8 @@ fn degenerate_polygons_and_singular_points_are_finite() {
                     for &model in MODELS {
                         let lit = polygon_light_contribution(model, surface, light, point, normal, viewer);
                         assert!(lit.total().is_finite(), "{lit:?} {light:?} {point} {normal}");
-                        // Each of 16 points is at most the whole hemisphere, 2 L; Torrance-Sparrow's factor at most 10⁴.
+                        // Each of 16 points is at most the whole hemisphere, 2 L; Torrance-Sparrow's factor is at
+                        // most 10⁴.
                         let most = if model == ReflectionModel::TorranceSparrow { 32e4 } else { 32.0 };
                         assert!(lit.specular.min_element() >= 0.0 && lit.specular.max_element() <= most);
                     }
@@ -274,13 +276,14 @@ fn degenerate_polygons_and_singular_points_are_finite() {
 #[test]
 fn the_arc_is_right_at_both_ends() {
     assert!((arc_excess(1.0) - (PI / 2.0 - 1.0)).abs() < 1e-15);
-    // Both sides of the switch to the series: θ/sin θ - 1 = 2/3 t² - 2/15 t⁴.
+    // On both sides of the switch to the series θ/sin θ - 1 = 2/3 t² - 2/15 t⁴.
     for t in [0.99e-8, 1.01e-8] {
         assert!((arc_excess(t) / t - 2.0 / 3.0).abs() < 3e-8, "{t}");
     }
 }
 
-/// How far few points are from 48 x 48, which are off by a hundredth of that, over a floor, relative to the brightest: (largest, root of the mean square).
+/// The error over a floor of few points compared with 48 x 48, whose own error is a hundredth of that, relative to
+/// the brightest point: (largest, root of the mean square).
 fn highlight_error(model: ReflectionModel, shininess: f64, light: &PolygonLight, samples: u32) -> (f64, f64) {
     let surface =
         SurfaceSample { specular: DVec3::ONE, shininess, ..SurfaceSample::from(&crate::Surface::default()) };
@@ -318,7 +321,7 @@ fn sixteen_points_make_a_smooth_highlight() {
             }
         }
     }
-    // Four times the points per edge: an eighth of the error at least (second order).
+    // Four times as many points per edge reduce the error to an eighth or less (second order).
     let (few, _) = highlight_error(ReflectionModel::Phong, 100.0, &panel, 4);
     let (more, _) = highlight_error(ReflectionModel::Phong, 100.0, &panel, 16);
     assert!(more < few / 8.0, "{few} {more}");
@@ -335,13 +338,13 @@ fn a_small_polygons_highlight_is_a_point_lights() {
     let (point, viewer) = (DVec3::new(1.0, 0.0, 0.0), DVec3::new(0.5, 0.8, 0.1).normalize());
     let direction = (DVec3::new(0.0, 2.0, 0.0) - point).normalize();
     for &model in MODELS {
-        // Radiance times area seen over π d².
+        // Radiance times projected area over π d².
         let attenuation = 1e-6 * direction.y / (PI * 5.0);
         let sample =
             LightSample { specular: DVec3::ONE, direction, attenuation, spot: 1.0, ..LightSample::DARK };
         let expected = light_contribution(model, surface, &sample, DVec3::Y, viewer).specular.x;
         let found = polygon_highlight(model, surface, &light, point, DVec3::Y, viewer, 4).x;
-        // The square of the angle it is seen under, 4e-4, times the exponent.
+        // The square of the angle that it subtends, 4e-4, times the exponent.
         assert!((found / expected - 1.0).abs() < 1e-4, "{}: {found:e} {expected:e}", model.name());
     }
 }

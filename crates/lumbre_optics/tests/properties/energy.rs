@@ -1,18 +1,19 @@
-//! Energy: how much of the light that meets a surface its highlight sends on, integrated over the hemisphere.
+//! Energy: the fraction of the incident light that a highlight reflects, integrated over the hemisphere.
 
 use std::f64::consts::{PI, TAU};
 
 use super::*;
 
-/// Rows and columns of the rule below.
+/// Rows and columns of the midpoint rule below.
 const ROWS: u32 = 192;
 const COLUMNS: u32 = 96;
 
-/// The part of the light from `light` that a surface with normal +Z and k_s = 1 sends on: ∫ factor (n·v) dω/(π n·l), as a light's
-/// colour is irradiance over π.
+/// The fraction of the light from `light` that a surface with normal +Z and k_s = 1 reflects: ∫ factor (n·v) dω/(π
+/// n·l), as a light's colour is irradiance over π.
 ///
-/// By the midpoint rule over half vectors that lie as Trowbridge and Reitz's distribution for `shininess` does, the one with the longest
-/// tail: all lobes of that width are smooth in its square. Kinks, where a half vector or a viewer sets, cost one cell in `ROWS`.
+/// It is computed by the midpoint rule over half vectors, distributed as in Trowbridge and Reitz's distribution for
+/// `shininess`. That distribution has the longest tail, and all lobes of that width are smooth in its square.
+/// Kinks, where a half vector or a viewer goes below the horizon, cost one cell in `ROWS`.
 fn reflected_part(light: DVec3, shininess: f64, factor: impl Fn(DVec3) -> f64) -> f64 {
     // c₃²: the distribution is half of its peak at sin² = (√2 - 1) c₃²/(1 - c₃²).
     let half_value = half_value_sine_squared(shininess);
@@ -36,12 +37,12 @@ fn reflected_part(light: DVec3, shininess: f64, factor: impl Fn(DVec3) -> f64) -
     sum / f64::from(ROWS * COLUMNS) / (PI * light.z)
 }
 
-/// What the rule may be off by. Against eight times as many rows and columns it is 8·10⁻⁴ at most, for light at 86 degrees, and below
-/// 10⁻⁴ up to 75; the elevations below go to 89 degrees.
+/// The error bound of the rule. Compared with eight times as many rows and columns it is at most 8·10⁻⁴, for light
+/// at 86 degrees, and below 10⁻⁴ up to 75 degrees; the tests go up to 89 degrees.
 const RULE: f64 = 2e-3;
 
 fn phong_part(light: DVec3, n: f64) -> f64 {
-    // Phong's lobe has the width of a half vector's of four times the exponent.
+    // Phong's lobe is as wide as that of a half vector with four times the exponent.
     reflected_part(light, 4.0 * n, |viewer| normalized_phong(DVec3::Z, light, viewer, n))
 }
 
@@ -55,7 +56,7 @@ fn microfacet_part(kind: (Distribution, Fresnel), light: DVec3, n: f64, specular
     })
 }
 
-/// A conductor that reflects all: without η there is no loss.
+/// A conductor that reflects everything: η = 0 has no loss.
 const MIRROR: Fresnel = Fresnel::Conductor { eta: Vec3::ZERO, absorption: Vec3::ONE };
 
 #[test]
@@ -72,29 +73,30 @@ fn the_usual_constant_of_blinn_sends_on_up_to_seven_and_a_half_per_cent_too_much
     let part = |n: f64| blinn_part(DVec3::Z, n) * (n + 8.0) / 8.0 / blinn_phong_normalization(n);
     let most = (0..40).map(f64::from).map(part).fold(0.0, f64::max);
     assert!((most - 1.0752).abs() < RULE, "{most}");
-    // Negative control of the rule: a lobe without its constant is off by it.
+    // Control of the rule: the lobe without its constant is off by exactly that constant.
     let bare = reflected_part(DVec3::Z, 50.0, |viewer| blinn_phong(DVec3::Z, DVec3::Z, viewer, 50.0));
     assert!((bare * blinn_phong_normalization(50.0) - 1.0).abs() < RULE, "{bare}");
 }
 
 #[test]
 fn bare_highlights_may_send_on_more_than_they_receive() {
-    // Why the normalized ones exist: Phong's step without n·l at grazing light, and microfacets that lie every way.
+    // This is why the normalized highlights exist: Phong's step without n·l at grazing light, and microfacets that
+    // face every direction.
     let light = DVec3::new(0.8, 0.0, 0.6);
     let step = reflected_part(light, 0.0, |viewer| phong(DVec3::Z, light, viewer, 0.0));
     assert!((step - 1.0 / 0.6).abs() < RULE, "{step}");
-    // ∫ G dω/π straight down for D = F = 1: G is 1 up to 60 degrees and 2 cos θ beyond: 3/2.
+    // ∫ G dω/π straight down for D = F = 1, where G is 1 up to 60 degrees and 2 cos θ beyond: 3/2.
     let rough = microfacet_part((Distribution::CosinePower, MIRROR), DVec3::Z, 0.0, 1.0);
     assert!((rough - 1.5).abs() < 2.0 * RULE, "{rough}");
 }
 
 #[test]
 fn a_nearly_smooth_mirror_of_microfacets_loses_nearly_nothing() {
-    // Straight down, at half value angles of a degree, nearly nothing is masked.
+    // Straight down, at half-value angles of a degree, almost nothing is masked.
     for &distribution in Distribution::ALL {
         let part = microfacet_part((distribution, MIRROR), DVec3::Z, 2000.0, 1.0);
         let whole = part * microfacet_normalization(distribution, 2000.0);
-        // What Trowbridge and Reitz's tail has beyond 30 degrees, where masking begins, is under 1 %.
+        // The part of Trowbridge and Reitz's tail beyond 30 degrees, where masking begins, is under 1 %.
         assert!(whole < 1.0 + RULE && whole > 0.99 - RULE, "{distribution:?}: {whole}");
     }
 }
@@ -127,7 +129,7 @@ proptest! {
         let normalization = microfacet_normalization(distribution, n);
         let bare = microfacet_part((distribution, fresnel), light, n, specular);
         prop_assert!(bare * normalization <= 1.0 + RULE, "{} of it, {} bare", bare * normalization, bare);
-        // Sharp enough, the model as it stands needs no constant.
+        // With a sharp enough lobe the plain model needs no constant.
         prop_assert!(normalization < 1.0 || bare <= 1.0 + RULE, "{}", bare);
     }
 }

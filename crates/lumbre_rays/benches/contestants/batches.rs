@@ -1,22 +1,23 @@
-//! The rays a scene is asked: coherent ones of a camera, cosine-distributed ones from its surfaces, shadow rays.
+//! The batches of rays that are traced in a scene: coherent camera rays, cosine-distributed rays from the surfaces,
+//! and shadow rays.
 
 use glam::Vec3;
 use lumbre_rays::{Ray, offset_ray_origin, triangle_extent};
 
 use super::scenes::Scene;
 
-/// A side of the camera's picture, and the rays of the other batches.
+/// Side length of the camera's picture; the other batches have as many rays as it has pixels.
 const SIDE: usize = 256;
 const RAYS: usize = SIDE * SIDE;
 
 pub struct Batch {
     pub name: &'static str,
-    /// Asked for any hit, or for the closest.
+    /// Whether any hit is asked for, or the closest.
     pub any: bool,
     pub rays: Vec<Ray>,
 }
 
-/// A pinhole camera of 90 degrees, row by row.
+/// The rays of a pinhole camera of 90 degrees, row by row.
 pub fn camera(scene: &Scene) -> Vec<Ray> {
     let [eye, target] = scene.camera;
     let forward = (target - eye).normalize();
@@ -29,7 +30,7 @@ pub fn camera(scene: &Scene) -> Vec<Ray> {
         .collect()
 }
 
-/// Origins uniform over the area, directions by the cosine about the normal.
+/// Rays with origins uniform over the surface area and directions cosine-distributed about the normal.
 pub fn cosine(scene: &Scene) -> Vec<Ray> {
     let mut random = Random(1);
     surface_points(scene, &mut random)
@@ -44,7 +45,7 @@ pub fn cosine(scene: &Scene) -> Vec<Ray> {
         .collect()
 }
 
-/// From the same origins to points of the lamp.
+/// Rays from such origins to points on the lamp.
 pub fn shadow(scene: &Scene) -> Vec<Ray> {
     let mut random = Random(2);
     let [corner, along, across] = scene.lamp;
@@ -56,7 +57,7 @@ pub fn shadow(scene: &Scene) -> Vec<Ray> {
         .collect()
 }
 
-/// Points just off the surfaces, their normals, and two random numbers each.
+/// Points just off the surfaces, with their normals and two random numbers each.
 fn surface_points(scene: &Scene, random: &mut Random) -> impl Iterator<Item = (Vec3, Vec3, [f32; 2])> {
     let mut cumulative = Vec::with_capacity(scene.triangles.len());
     let mut total = 0.0f64;
@@ -82,7 +83,7 @@ fn surface_points(scene: &Scene, random: &mut Random) -> impl Iterator<Item = (V
 struct Random(u64);
 
 impl Random {
-    /// In [0, 1).
+    /// A number in [0, 1).
     fn unit(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

@@ -1,4 +1,5 @@
-//! What both benchmarks share: scenes, batches of rays, and the crates that trace them. Not the measuring.
+//! What both benchmarks share: scenes, batches of rays, and the crates that trace them. The measuring itself is in
+//! the benchmarks.
 #![allow(dead_code, reason = "each benchmark uses a part of this")]
 
 pub mod batches;
@@ -10,7 +11,7 @@ use batches::{Batch, camera, cosine, shadow};
 use scenes::Scene;
 use tracers::Tracers;
 
-/// A scene in every crate's hierarchy, and the rays it is asked.
+/// A scene in every crate's hierarchy, and the rays to trace in it.
 pub struct Case {
     pub scene: &'static str,
     pub triangles: usize,
@@ -18,7 +19,7 @@ pub struct Case {
     pub batches: Vec<Batch>,
 }
 
-/// All scenes; those whose file is not there are named on standard error.
+/// All scenes; those whose file is missing are reported on standard error.
 pub fn cases() -> Vec<Case> {
     cases_of(scenes::all())
 }

@@ -1,11 +1,11 @@
-//! Triangles of a glTF file. Not a scene: materials and lights are passed over.
+//! Loads the triangles of a glTF file; materials and lights are ignored.
 
 use std::error::Error;
 use std::path::Path;
 
 use glam::{Mat4, Vec3};
 
-/// A model of the `shared/models` folder beside the checkout, or why there is none.
+/// Returns a model from the `shared/models` folder beside the checkout, or the reason why there is none.
 pub fn shared(name: &str) -> Result<Vec<[Vec3; 3]>, Box<dyn Error>> {
     let checkout = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let path = ["../shared/models", "../../shared/models"]

@@ -1,16 +1,17 @@
-//! Rooms to trace: the Cornell box, two furnished rooms, walls in small triangles, the Stanford bunny in a room. Not their rays.
+//! The scenes to trace: the Cornell box, two furnished rooms, walls in small triangles, and the Stanford bunny in a
+//! room. Their rays are in `batches`.
 
 use glam::{Mat4, Quat, Vec3};
 
 use super::models;
 
-/// Closed rooms with a lamp under the ceiling, seen from inside; metres, y up.
+/// A closed room with a lamp under the ceiling, seen from inside; in metres, y up.
 pub struct Scene {
     pub name: &'static str,
     pub triangles: Vec<[Vec3; 3]>,
-    /// Corner, and the two edges from there.
+    /// A corner of the lamp and the two edges from there.
     pub lamp: [Vec3; 3],
-    /// Where the camera stands and what it looks at.
+    /// The camera's position and the point that it looks at.
     pub camera: [Vec3; 2],
 }
 
@@ -23,12 +24,12 @@ pub fn all() -> Vec<Scene> {
     scenes
 }
 
-/// Those that need no file.
+/// The scenes that need no file.
 pub fn rooms() -> Vec<Scene> {
     vec![cornell(), study(), bedroom(), empty_room()]
 }
 
-/// A room of `size` over the origin's corner, a lamp of a fifth of that, and furniture.
+/// A room from the origin to `size`, with a lamp a fifth as long and wide, and furniture.
 fn room(name: &'static str, size: Vec3, furniture: Vec<[Vec3; 3]>) -> Scene {
     let mut triangles = cuboid(Mat4::from_translation(size / 2.0) * Mat4::from_scale(size), true);
     let lamp = [
@@ -57,7 +58,7 @@ fn cornell() -> Scene {
 fn study() -> Scene {
     let mut furniture = table(Vec3::new(2.9, 0.0, 1.2), Vec3::new(1.6, 0.74, 0.8), 0.0);
     furniture.extend(chair(Vec3::new(2.8, 0.0, 1.9), 0.4));
-    // A shelf: two sides and five boards.
+    // A shelf of two sides and five boards.
     for x in [0.5, 1.5] {
         furniture.extend(block(Vec3::new(x, 1.0, 3.7), Vec3::new(0.03, 2.0, 0.3), 0.0));
     }
@@ -69,7 +70,7 @@ fn study() -> Scene {
 
 fn bedroom() -> Scene {
     let mut furniture = table(Vec3::new(5.0, 0.0, 2.9), Vec3::new(0.8, 0.6, 0.8), 0.7);
-    // A wall with a doorway, a bed with its head, two bedside tables, a wardrobe.
+    // A wall with a doorway, a bed with its headboard, two bedside tables, and a wardrobe.
     for (centre, size) in [
         (Vec3::new(3.5, 1.3, 0.75), Vec3::new(0.12, 2.6, 1.5)),
         (Vec3::new(3.5, 1.3, 3.2), Vec3::new(0.12, 2.6, 1.6)),
@@ -87,7 +88,7 @@ fn bedroom() -> Scene {
     room("two rooms", Vec3::new(7.0, 2.6, 4.0), furniture)
 }
 
-/// Nothing but walls, in small triangles: the highest planes of the scene are full of them.
+/// Only walls, in small triangles, so that the highest planes of the scene are full of them.
 fn empty_room() -> Scene {
     const ALONG: usize = 100;
     let mut scene = room("walls in small triangles", Vec3::new(4.0, 3.0, 4.0), Vec::new());
@@ -118,7 +119,7 @@ fn bunny_room(mut bunny: Vec<[Vec3; 3]>) -> Scene {
     room("bunny in a room", size, bunny)
 }
 
-/// A top on four legs.
+/// A table top on four legs.
 fn table(foot: Vec3, size: Vec3, turned: f32) -> Vec<[Vec3; 3]> {
     let turn = Quat::from_rotation_y(turned);
     let mut triangles = block(foot + Vec3::Y * size.y, Vec3::new(size.x, 0.04, size.z), turned);
@@ -140,7 +141,7 @@ fn block(centre: Vec3, size: Vec3, turned: f32) -> Vec<[Vec3; 3]> {
     cuboid(Mat4::from_scale_rotation_translation(size, Quat::from_rotation_y(turned), centre), false)
 }
 
-/// The unit cube about the origin, placed; 12 triangles.
+/// The unit cube around the origin, transformed by `place`; 12 triangles.
 fn cuboid(place: Mat4, inward: bool) -> Vec<[Vec3; 3]> {
     let corner = |i: usize| {
         let side = |bit: usize| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };

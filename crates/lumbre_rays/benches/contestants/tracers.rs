@@ -1,6 +1,7 @@
-//! The crates that are compared, each with its best builder (obvhs: its slow build, within 7 % of the fastest to trace of its
-//! presets wherever it is not that itself) and its own way to ask. All but ours test triangles by
-//! obvhs' `RtTriangle` (Möller and Trumbore with edges and normal precomputed): fast, and not watertight.
+//! The crates that are compared, each with its best builder and its own query API. For obvhs that is its slow
+//! build, which traces within 7 % of the fastest of its presets wherever it is not the fastest itself. All but ours
+//! test triangles with obvhs' `RtTriangle` (Möller and Trumbore with precomputed edges and normal), which is fast
+//! and not watertight.
 
 use std::cell::Cell;
 use std::hint::black_box;
@@ -15,7 +16,7 @@ use nalgebra::{Point3, Vector3};
 use obvhs::ray::{Ray as ObvhsRay, RayHit};
 use obvhs::{BvhBuildParams, bvh2, cwbvh, rt_triangle::RtTriangle, triangle::Triangle};
 
-/// Who traces.
+/// The crate and hierarchy that traces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tracer {
     Lumbre,
@@ -39,7 +40,7 @@ impl Tracer {
 
 /// One scene in every hierarchy.
 pub struct Tracers {
-    /// What building ours took.
+    /// How long building ours took, in seconds.
     pub build_seconds: f64,
     lumbre: Bvh,
     /// With the triangles in the order of the leaves.
@@ -48,7 +49,7 @@ pub struct Tracers {
     bvh: (bvh::bvh::Bvh<f32, 3>, Vec<Shape>),
 }
 
-/// Hits, and for closest hits the sum of their distances.
+/// The number of hits, and for closest hits the sum of their distances.
 pub type Answer = (usize, f64);
 
 impl Tracers {
@@ -135,8 +136,8 @@ impl Tracers {
         })
     }
 
-    /// Panics unless all find the same but for the few of ten thousand rays that slip through an edge where a test is
-    /// not watertight. Returns our hits.
+    /// Panics unless all find the same, except for at most one ray in a thousand, as rays slip through edges where
+    /// a test is not watertight. Returns our number of hits.
     pub fn agree(&self, scene: &str, batch: &Batch) -> usize {
         let (hits, distance) = self.trace(Tracer::Lumbre, batch.any, &batch.rays);
         for tracer in &Tracer::ALL[1..] {
@@ -168,7 +169,8 @@ fn obvhs_ray(ray: &Ray) -> ObvhsRay {
     ObvhsRay::new(ray.origin.into(), ray.direction.into(), ray.t_min, ray.t_max)
 }
 
-/// A ray of the `bvh` crate that grows shorter; its direction is normalized, so distances are in metres.
+/// A ray of the `bvh` crate that gets shorter with each hit. Its direction is normalized, so distances are in
+/// metres.
 struct Query {
     ray: bvh::ray::Ray<f32, 3>,
     unit: f32,

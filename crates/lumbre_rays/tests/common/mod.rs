@@ -1,4 +1,4 @@
-//! Random numbers of a fixed seed and closed surfaces for the tests. Not a statistics library.
+//! Random numbers with a fixed seed and closed surfaces for the tests.
 #![allow(dead_code, reason = "each test binary uses a part of this")]
 
 use glam::{DVec3, Vec3};
@@ -15,17 +15,17 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// In [0, 1).
+    /// A number in [0, 1).
     pub fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1 << 24) as f32
     }
 
-    /// In [-1, 1)^3.
+    /// A point in [-1, 1)^3.
     pub fn cube(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }
 
-    /// Uniform on the unit sphere.
+    /// A direction uniform on the unit sphere.
     pub fn direction(&mut self) -> Vec3 {
         loop {
             let point = self.cube();
@@ -35,14 +35,14 @@ impl Random {
         }
     }
 
-    /// Uniform in a triangle, as weights (u, v) of the second and third vertex.
+    /// A point uniform in a triangle, as weights (u, v) of the second and third vertex.
     pub fn barycentric(&mut self) -> (f32, f32) {
         let (u, v) = (self.unit(), self.unit());
         if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) }
     }
 }
 
-/// A box between two corners, outward, 12 triangles over 8 shared vertices.
+/// A box between two corners, facing outward, of 12 triangles over 8 shared vertices.
 pub fn cuboid(min: Vec3, max: Vec3) -> Vec<[Vec3; 3]> {
     let corner = |i: usize| {
         let pick = |bit: usize| if i >> bit & 1 == 1 { max[bit] } else { min[bit] };
@@ -55,7 +55,7 @@ pub fn cuboid(min: Vec3, max: Vec3) -> Vec<[Vec3; 3]> {
         .collect()
 }
 
-/// A sphere by subdividing an octahedron, outward; shared vertices are bit-identical.
+/// A sphere made by subdividing an octahedron, facing outward; shared vertices are bit-identical.
 pub fn sphere(depth: u32, radius: f32, centre: Vec3) -> Vec<[Vec3; 3]> {
     let mut faces = Vec::new();
     for i in 0..8 {
@@ -77,7 +77,8 @@ pub fn sphere(depth: u32, radius: f32, centre: Vec3) -> Vec<[Vec3; 3]> {
     faces.into_iter().map(|face| face.map(|p| p.as_vec3() * radius + centre)).collect()
 }
 
-/// Loose triangles in the cube [-1, 1]^3, `size` across.
+/// Loose triangles around points of the cube [-1, 1]^3, with vertices up to `size` from those points along each
+/// axis.
 pub fn soup(random: &mut Random, count: usize, size: f32) -> Vec<[Vec3; 3]> {
     (0..count)
         .map(|_| {
