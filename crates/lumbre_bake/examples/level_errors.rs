@@ -32,7 +32,7 @@ use lumbre_trace::flip::mean_flip;
 const WIDTH: usize = 640;
 const HEIGHT: usize = 400;
 /// Batches of 576 paths for a point with `--paths`, at most.
-const MOST_BATCHES: usize = 1200;
+const MAX_BATCHES: usize = 1200;
 /// Points that are named.
 const WORST: usize = 24;
 /// What a converged bake may take.
@@ -193,7 +193,7 @@ fn points(name: &str, world: &mut World, request: &Request) -> Result<Vec<Irradi
     }
     let tracer = PathTracer::new(world);
     let (tracer, effort) = match request.paths {
-        true => (tracer, Effort { batches: [16, MOST_BATCHES], ..Effort::reference() }),
+        true => (tracer, Effort { batches: [16, MAX_BATCHES], ..Effort::reference() }),
         false => (tracer.with_bounced(7), Effort::reference()),
     };
     let found = tracer.points(request.points, effort, 7);

@@ -7,27 +7,27 @@ use bevy_ecs::world::World;
 use lumbre_scene::{IrradianceVolume, Transform};
 
 use crate::apply::apply;
-use crate::checkpoint::Tape;
+use crate::checkpoint::CheckpointFile;
 use crate::content_hash::{ContentHash, Hashes, hashes_of};
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::direct_light::direct_light;
 use crate::final_gather::radiance_cache::RadianceCache;
-use crate::final_gather::rounds::{self, Bounced};
+use crate::final_gather::rounds::{self, IndirectLight};
 use crate::finish::baked_scene::{BakedMap, BakedObject, BakedScene, FilledTexels, baked_objects};
 use crate::finish::fill::fill;
 use crate::finish::pages::Pages;
 use crate::finish::resolution_error::{compare, dense_points};
-use crate::finish::seams::{Maps, Shown, close_seams};
+use crate::finish::seams::{MapValues, Maps, close_seams};
 use crate::finish::separate_light::separate;
 use crate::finish::worst_places::worst_places;
 use crate::memory;
+use crate::monitor::{BakeMonitor, Callback, Stage};
 use crate::notes::{finish, note_direct_error, note_mean};
 use crate::probes;
-use crate::progress::{Callback, Stage, Watch};
 use crate::radiosity::exchange::Exchange;
 use crate::radiosity::patch_light::patch_light;
 use crate::radiosity::patches::Patches;
-use crate::rebake::{Changes, Found, Samples, Usable, kept_bounces, rebake_report};
+use crate::rebake::{Changes, ReusableBake, SampleCollector, Samples, kept_bounces, rebake_report};
 use crate::scene::{StaticScene, density_of, from_world};
 use crate::{
     BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, ErrorAtTime, Progress, preparing,
@@ -174,16 +174,17 @@ impl<'a> Bake<'a> {
     fn on_threads(mut self, scene: &Arc<StaticScene>) -> Result<BakedScene, BakeError> {
         let mut bake = || {
             let mut report = BakeReport { threads: rayon::current_num_threads(), ..BakeReport::default() };
-            let watch = Watch::new(&mut *self.progress, self.options.time);
-            let mut watch = watch.cancelled_by(self.cancel.clone());
+            let monitor = BakeMonitor::new(&mut *self.progress, self.options.time);
+            let mut monitor = monitor.cancelled_by(self.cancel.clone());
             let request = Request {
                 options: &self.options,
                 checkpoint: self.checkpoint,
                 former: self.former,
                 keeps_samples: self.keeps_samples,
             };
-            let Light { objects, maps, volume, samples } = run(scene, &request, &mut watch, &mut report)?;
-            Ok(BakedScene { objects, maps, volume, samples, report: finish(report, &mut watch) })
+            let BakeOutput { objects, maps, volume, samples } =
+                run(scene, &request, &mut monitor, &mut report)?;
+            Ok(BakedScene { objects, maps, volume, samples, report: finish(report, &mut monitor) })
         };
         match self.options.threads {
             None => bake(),
@@ -197,7 +198,7 @@ impl<'a> Bake<'a> {
 
 /// What the stages have made: a baked scene before its report is finished.
 #[derive(Default)]
-struct Light {
+struct BakeOutput {
     objects: Vec<BakedObject>,
     maps: Vec<BakedMap>,
     volume: Option<(Transform, IrradianceVolume)>,
@@ -216,111 +217,112 @@ struct Request<'a> {
 fn run(
     input: &Arc<StaticScene>,
     request: &Request<'_>,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
-) -> Result<Light, BakeError> {
+) -> Result<BakeOutput, BakeError> {
     let options = request.options;
-    watch.stage(Stage::Layout, report)?;
-    let hashes = watch.during(0.0, || hashes_of(input, options))?;
+    monitor.stage(Stage::Layout, report)?;
+    let hashes = monitor.run_interruptible(0.0, || hashes_of(input, options))?;
     report.content_hash = hashes.content.to_string();
-    let usable = Usable::of(request.former, &hashes, input, options, report);
-    let identity = request.identity(&hashes, usable.as_ref());
-    watch.tape = request.tape(&identity)?;
+    let reusable = ReusableBake::of(request.former, &hashes, input, options, report);
+    let identity = request.identity(&hashes, reusable.as_ref());
+    monitor.checkpoint = request.open_checkpoint(&identity)?;
     if input.objects.is_empty() {
         return Ok(nothing_to_bake("the scene has no static mesh", report));
     }
-    let space = usable.as_ref().map_or_else(|| input.space(), |usable| usable.space);
-    let density = usable.as_ref().map(|usable| usable.density);
+    let space = reusable.as_ref().map_or_else(|| input.space(), |reusable| reusable.space);
+    let density = reusable.as_ref().map(|reusable| reusable.density);
     let density = density.unwrap_or_else(|| density_of(&input.objects, space, options));
-    let layout = preparing::layout(input, space, density, options, watch, report)?;
+    let layout = preparing::layout(input, space, density, options, monitor, report)?;
 
-    watch.stage(Stage::Hierarchy, report)?;
-    let (scene, layout, emitters) = preparing::scene(input, layout, space, watch, report)?;
-    let sources = preparing::sources(input, &scene, emitters, watch, report)?;
+    monitor.stage(Stage::Hierarchy, report)?;
+    let (scene, layout, emitters) = preparing::scene(input, layout, space, monitor, report)?;
+    let sources = preparing::sources(input, &scene, emitters, monitor, report)?;
     if sources.is_empty() {
         let why = "no surface emits, no light is static or mixed, and there is no sky";
         return Ok(nothing_to_bake(why, report));
     }
-    let for_samples = request.bytes_of_samples(usable.is_some());
+    let for_samples = request.bytes_of_samples(reusable.is_some());
     memory::check_texels(&scene, &layout, for_samples, options)?;
 
-    watch.stage(Stage::DirectLight, report)?;
-    let texels = CoveredTexels::new(&scene, &layout, watch, report)?;
-    let for_patches = options.of_patches(watch.clock().is_past(SHORT));
-    let resolution =
-        watch.during(1.0, || memory::resolution(&scene, &texels, for_samples, &for_patches, report))??;
-    let find = |usable| Changes::find(&usable, &hashes, &input.objects, &sources, &texels);
-    let changes = watch.during(1.0, || usable.map(find))?;
+    monitor.stage(Stage::DirectLight, report)?;
+    let texels = CoveredTexels::new(&scene, &layout, monitor, report)?;
+    let for_patches = options.of_patches(monitor.clock().is_past(SHORT));
+    let resolution = monitor.run_interruptible(1.0, || {
+        memory::resolution(&scene, &texels, for_samples, &for_patches, report)
+    })??;
+    let find = |reusable| Changes::find(&reusable, &hashes, &input.objects, &sources, &texels);
+    let changes = monitor.run_interruptible(1.0, || reusable.map(find))?;
     let known = changes.as_ref().map_or(&[][..], |changes| &changes.known_direct);
-    let direct = direct_light(&sources, &texels, known, options, watch, report)?;
+    let direct = direct_light(&sources, &texels, known, options, monitor, report)?;
 
     let of_patches = |patches: &Patches| patch_light(&scene, &texels, &direct, patches);
-    let exchange = Exchange::new(&scene, &sources, &for_patches, resolution, of_patches, watch, report)?;
+    let exchange = Exchange::new(&scene, &sources, &for_patches, resolution, of_patches, monitor, report)?;
     let (exchange, kept) = match (exchange, &changes) {
         (None, _) => (None, None),
         (Some((exchange, _)), None) => (Some(exchange), None),
         (Some((exchange, factors)), Some(changes)) => {
             let (kept, rays) =
-                kept_bounces(changes, &sources, &texels, &direct, (&exchange, &factors), options, watch)?;
+                kept_bounces(changes, &sources, &texels, &direct, (&exchange, &factors), options, monitor)?;
             report.rays += rays;
             (Some(exchange), Some(kept))
         }
     };
     let (bounced, cache) = match &exchange {
-        None => (Bounced::none(&direct), None),
+        None => (IndirectLight::none(&direct), None),
         Some(exchange) => {
-            watch.stage(Stage::FinalGather, report)?;
-            let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, watch)?;
+            monitor.stage(Stage::FinalGather, report)?;
+            let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, monitor)?;
             let bounced =
-                rounds::gather(&mut cache, &texels, &direct, kept.as_ref(), options, watch, report)?;
+                rounds::gather(&mut cache, &texels, &direct, kept.as_ref(), options, monitor, report)?;
             (bounced, Some(cache))
         }
     };
-    let volume = probes::bake(input, &scene, &sources, cache.as_ref(), options, watch, report)?;
-    let points = dense_points(&sources, cache.as_ref(), options, watch, report)?;
+    let volume = probes::bake(input, &scene, &sources, cache.as_ref(), options, monitor, report)?;
+    let points = dense_points(&sources, cache.as_ref(), options, monitor, report)?;
 
-    watch.stage(Stage::Texels, report)?;
+    monitor.stage(Stage::Texels, report)?;
     let light = bounced.with(&direct);
     let variances = &bounced.variances;
     note_mean(&texels.list, &light, report);
     if exchange.is_none() {
         note_direct_error(&texels.list, &direct, &variances.expected, options, report);
-        report.ended = Ended::after(report.error_reached, watch.is_late(), true);
-        report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
+        report.ended = Ended::after(report.error_reached, monitor.is_late(), true);
+        report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
     }
     if let Some(changes) = &changes {
         report.rebake = Some(rebake_report(changes, &texels.list, kept.as_ref(), report));
     }
     let (squares, whole) = (direct.local.relative(&variances.expected), report.estimated_error);
-    report.worst =
-        watch.during(0.0, || worst_places(&scene, &input.objects, &texels.list, &squares, whole))?;
+    report.worst = monitor
+        .run_interruptible(0.0, || worst_places(&scene, &input.objects, &texels.list, &squares, whole))?;
     // Whoever has more time would not want to keep these.
     let samples = match request.keeps_samples && report.ended != Ended::Time {
         false => None,
         true => {
             let exitance = exchange.as_ref().map(|exchange| exchange.exitance_of(&scene, layout.maps.len()));
-            let found = Found {
+            let found = SampleCollector {
                 scene: &scene,
                 layout: &layout,
                 texels: &texels.list,
                 direct: &direct.texels,
                 gathered: &bounced.gathered,
                 bounced: &bounced.light,
-                neglected: kept.as_ref().map_or(&[], |kept| &kept.neglected),
+                reuse_error: kept.as_ref().map_or(&[], |kept| &kept.reuse_error),
             };
             let exitance = exitance.unwrap_or_default();
-            Some(
-                watch
-                    .during(0.0, || found.samples(identity, &hashes, &input.objects, &sources, &exitance))?,
-            )
+            Some(monitor.run_interruptible(0.0, || {
+                found.samples(identity, &hashes, &input.objects, &sources, &exitance)
+            })?)
         }
     };
-    watch.advance(0.2)?;
+    monitor.advance(0.2)?;
     let known = (light.as_slice(), variances.cautious.as_slice());
-    let (mut filled, mut errors) = watch.during(0.2, || fill(&texels, known, options.gap, &scene.stop))?;
-    watch.advance(1.0)?;
+    let (mut filled, mut errors) =
+        monitor.run_interruptible(0.2, || fill(&texels, known, options.gap, &scene.stop))?;
+    monitor.advance(1.0)?;
 
-    watch.stage(Stage::Seams, report)?;
+    monitor.stage(Stage::Seams, report)?;
     let maps = Maps {
         scene: &scene,
         layout: &layout,
@@ -328,38 +330,40 @@ fn run(
         charts: &texels.charts,
         mean: report.mean_irradiance.iter().sum::<f64>() / 3.0,
     };
-    let shown = Shown { light: &mut filled, variances: &mut errors };
-    close_seams(&maps, shown, options, watch, report)?;
-    watch.advance(0.9)?;
-    report.resolution = watch.during(0.9, || compare(&scene, &layout, &filled, &errors, &points))?;
-    let pages = watch.during(0.9, || Pages::new(&layout, options.atlas_size, options.gap))?;
+    let shown = MapValues { light: &mut filled, variances: &mut errors };
+    close_seams(&maps, shown, options, monitor, report)?;
+    monitor.advance(0.9)?;
+    report.resolution =
+        monitor.run_interruptible(0.9, || compare(&scene, &layout, &filled, &errors, &points))?;
+    let pages = monitor.run_interruptible(0.9, || Pages::new(&layout, options.atlas_size, options.gap))?;
     report.atlases = pages.pages.len();
     report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
-    let separate = watch.during(1.0, || {
+    let separate = monitor.run_interruptible(1.0, || {
         let parts = options.separate_light.then_some((&direct, &bounced));
         parts.map(|parts| separate(&texels, parts, &filled, options.gap, &scene.stop))
     })?;
     let found = FilledTexels { irradiance: &filled, variances: &errors, separate: separate.as_ref() };
-    let (objects, maps) = watch.during(1.0, || baked_objects(&input.objects, &layout, &found, &pages))?;
-    watch.advance(1.0)?;
+    let (objects, maps) =
+        monitor.run_interruptible(1.0, || baked_objects(&input.objects, &layout, &found, &pages))?;
+    monitor.advance(1.0)?;
     let volume = volume.map(|placed| (placed.grid.transform(space), placed.volume));
-    Ok(Light { objects, maps, volume, samples })
+    Ok(BakeOutput { objects, maps, volume, samples })
 }
 
 /// Where more than this share of direct light's time is gone before any light is known, the time is short beside the scene's size.
 const SHORT: f64 = 0.3;
 
 /// Says why there is no light.
-fn nothing_to_bake(why: &str, report: &mut BakeReport) -> Light {
+fn nothing_to_bake(why: &str, report: &mut BakeReport) -> BakeOutput {
     report.skipped.push(format!("everything: {why}"));
     report.error_reached = true;
-    Light::default()
+    BakeOutput::default()
 }
 
 impl Request<'_> {
     /// Of all that this bake's bits follow from.
-    fn identity(&self, hashes: &Hashes, usable: Option<&Usable<'_>>) -> ContentHash {
-        let identity = usable.map_or(hashes.content, |usable| usable.identity(hashes.content));
+    fn identity(&self, hashes: &Hashes, reusable: Option<&ReusableBake<'_>>) -> ContentHash {
+        let identity = reusable.map_or(hashes.content, |reusable| reusable.identity(hashes.content));
         // What is kept takes memory, too: within a limit, other patches may fit.
         let limited = self.options.memory.is_some() && self.bytes_of_samples(self.former.is_some()) > 0;
         if limited { identity.made_from(&hashes.sampling) } else { identity }
@@ -367,14 +371,14 @@ impl Request<'_> {
 
     /// Bytes of a covered texel for the samples of this bake, and for those of a former one where they are used.
     fn bytes_of_samples(&self, uses_former: bool) -> u64 {
-        let own = if self.keeps_samples { memory::SAMPLES } else { 0 };
-        own + if uses_former { memory::FORMER } else { 0 }
+        let own = if self.keeps_samples { memory::SAMPLES_BYTES } else { 0 };
+        own + if uses_former { memory::FORMER_SAMPLES_BYTES } else { 0 }
     }
 
     /// What this bake computes is kept there.
-    fn tape(&self, identity: &ContentHash) -> Result<Tape, BakeError> {
-        let Some(checkpoint) = self.checkpoint else { return Ok(Tape::default()) };
-        Tape::open(checkpoint, identity)
+    fn open_checkpoint(&self, identity: &ContentHash) -> Result<CheckpointFile, BakeError> {
+        let Some(checkpoint) = self.checkpoint else { return Ok(CheckpointFile::default()) };
+        CheckpointFile::open(checkpoint, identity)
             .map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::BakeError;
 use crate::checkpoint::Record;
-use crate::progress::Watch;
+use crate::monitor::BakeMonitor;
 
 /// Seconds that a chunk should take: a prompt answer, and long enough to keep the threads busy.
 const PACE: f64 = 0.1;
@@ -23,38 +23,38 @@ const MOST: usize = 1 << 16;
 /// [`BakeError::Cancelled`].
 pub(crate) fn in_chunks<T: Send + Record>(
     count: usize,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
-    chunks(count, watch, false, compute)
+    chunks(count, monitor, false, compute)
 }
 
 /// As [`in_chunks`], but it ends when the time is up: the values are then those of the first indices only.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
-pub(crate) fn in_chunks_in_time<T: Send + Record>(
+pub(crate) fn in_chunks_until_deadline<T: Send + Record>(
     count: usize,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
-    chunks(count, watch, true, compute)
+    chunks(count, monitor, true, compute)
 }
 
 /// As [`in_chunks`], of a list that is quick to make anew and so not kept in the checkpoint.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
-pub(crate) fn in_chunks_anew<T: Send>(
+pub(crate) fn in_chunks_uncheckpointed<T: Send>(
     count: usize,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
     let mut values = Vec::with_capacity(count);
     while values.len() < count {
         let end = (values.len() + LEAST).min(count);
-        values.extend(chunk(values.len(), end, count, watch, &compute)?);
-        watch.advance(values.len() as f32 / count as f32)?;
+        values.extend(chunk(values.len(), end, count, monitor, &compute)?);
+        monitor.advance(values.len() as f32 / count as f32)?;
     }
     Ok(values)
 }
@@ -64,13 +64,13 @@ fn chunk<T: Send>(
     start: usize,
     end: usize,
     count: usize,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
-    let stop = watch.stop().clone();
+    let stop = monitor.stop().clone();
     let one = |index: usize| (!stop.is_cancelled()).then(|| compute(index));
-    let done =
-        watch.during(start as f32 / count as f32, || (start..end).into_par_iter().map(one).collect())?;
+    let done = monitor
+        .run_interruptible(start as f32 / count as f32, || (start..end).into_par_iter().map(one).collect())?;
     // None only if it was stopped, which has ended here already.
     let done: Option<Vec<T>> = done;
     Ok(done.unwrap_or_default())
@@ -78,7 +78,7 @@ fn chunk<T: Send>(
 
 fn chunks<T: Send + Record>(
     count: usize,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     may_end: bool,
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
@@ -86,25 +86,25 @@ fn chunks<T: Send + Record>(
     let mut size = FIRST;
     while values.len() < count {
         let start = values.len();
-        if let Some(kept) = watch.recall(start, count) {
+        if let Some(kept) = monitor.load_chunk(start, count) {
             if kept.is_empty() && may_end {
-                watch.cut_short();
+                monitor.cut_short();
                 break;
             }
             values.extend(kept);
-        } else if may_end && watch.clock().late() {
-            watch.keep::<T>(start, count, &[]);
-            watch.cut_short();
+        } else if may_end && monitor.clock().is_over() {
+            monitor.store_chunk::<T>(start, count, &[]);
+            monitor.cut_short();
             break;
         } else {
             let begun = Instant::now();
             let end = (start + size).min(count);
-            values.extend(chunk(start, end, count, watch, &compute)?);
-            watch.keep(start, count, &values[start..]);
+            values.extend(chunk(start, end, count, monitor, &compute)?);
+            monitor.store_chunk(start, count, &values[start..]);
             let wanted = size as f64 * PACE / begun.elapsed().as_secs_f64().max(1e-6);
             size = (wanted as usize).min(4 * size).clamp(LEAST, MOST);
         }
-        watch.advance(values.len() as f32 / count as f32)?;
+        monitor.advance(values.len() as f32 / count as f32)?;
     }
     Ok(values)
 }

@@ -38,7 +38,6 @@
 //! # Ok::<(), lumbre_bake::BakeError>(())
 //! ```
 
-mod allocation;
 mod apply;
 mod bake;
 mod cancel_token;
@@ -54,14 +53,15 @@ mod error;
 mod final_gather;
 mod finish;
 mod memory;
+mod monitor;
 mod notes;
 mod options;
 mod preparing;
 mod probes;
-mod progress;
 mod radiosity;
 mod rebake;
 mod report;
+mod sample_allocation;
 mod sampling;
 mod scene;
 mod sources;
@@ -76,8 +76,8 @@ pub use checkpoint::Checkpoint;
 pub use content_hash::{ContentHash, content_hash};
 pub use error::{BakeError, CheckpointError};
 pub use finish::baked_scene::{BakedMap, BakedObject, BakedScene, TexelErrors};
+pub use monitor::Progress;
 pub use options::{BakeOptions, Density, FormFactorMethod, Probes, Quality, Solver};
-pub use progress::Progress;
 pub use rebake::{Samples, SamplesError};
 pub use report::{
     BakeReport, Ended, ErrorAtTime, ErrorPart, ProbeReport, RebakeReport, ResolutionReport, SeamReport,

@@ -3,22 +3,22 @@
 use crate::coverage::footprint::Texel;
 use crate::direct_light::DirectLight;
 use crate::final_gather::error_ledger::{ErrorLedger, open_sum, relative_to, root};
-use crate::progress::Watch;
+use crate::monitor::BakeMonitor;
 use crate::{BakeOptions, BakeReport, ErrorAtTime};
 use glam::Vec3;
 
 /// Ends the last stage.
-pub(crate) fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {
-    watch.end_stage(&mut report);
+pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> BakeReport {
+    monitor.end_stage(&mut report);
     // What is still to be done with the result may be interrupted too.
-    watch.tape.flush();
-    report.seconds = watch.seconds();
+    monitor.checkpoint.flush();
+    report.seconds = monitor.seconds();
     // From here on there is a map of that error.
     if !report.curve.is_empty() {
         report.curve.push(ErrorAtTime { seconds: report.seconds, error: report.estimated_error });
     }
-    report.resumed_seconds = watch.tape.resumed;
-    report.warnings.append(&mut watch.tape.warnings);
+    report.resumed_seconds = monitor.checkpoint.resumed;
+    report.warnings.append(&mut monitor.checkpoint.warnings);
     let casting: f64 = report
         .stages
         .iter()

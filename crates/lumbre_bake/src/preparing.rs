@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::progress::Watch;
+use crate::monitor::BakeMonitor;
 use crate::scene::{BakeScene, Canonical, LightmapLayout, StaticScene, lay_out};
 use crate::sources::emitters::{Emitter, coarse_textures, emitters};
 use crate::sources::light_sources::{Sources, shines_inside_only};
@@ -18,11 +18,11 @@ pub(crate) fn layout(
     space: Canonical,
     density: f64,
     options: &BakeOptions,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<LightmapLayout, BakeError> {
-    let (input, options, stop) = (Arc::clone(input), *options, watch.stop().clone());
-    let (layout, warnings) = watch.apart(0.0, move || {
+    let (input, options, stop) = (Arc::clone(input), *options, monitor.stop().clone());
+    let (layout, warnings) = monitor.run_detached(0.0, move || {
         let mut warnings = Vec::new();
         (lay_out(&input.objects, space, density, &options, &stop, &mut warnings), warnings)
     })?;
@@ -38,20 +38,20 @@ pub(crate) fn scene(
     input: &Arc<StaticScene>,
     layout: LightmapLayout,
     space: Canonical,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<(BakeScene, LightmapLayout, Vec<Emitter>), BakeError> {
-    let (own, stop) = (Arc::clone(input), watch.stop().clone());
-    let (scene, layout, warnings) = watch.apart(0.0, move || {
+    let (own, stop) = (Arc::clone(input), monitor.stop().clone());
+    let (scene, layout, warnings) = monitor.run_detached(0.0, move || {
         let mut warnings = Vec::new();
         let scene = BakeScene::new(&own.objects, &layout, space, &stop, &mut warnings);
         (scene, layout, warnings)
     })?;
     report.warnings.extend(warnings);
     let mut scene = scene?;
-    let emitters = watch.during(0.8, || emitters(&scene))?;
+    let emitters = monitor.run_interruptible(0.8, || emitters(&scene))?;
     scene.dark_outside = shines_inside_only(&scene, &emitters, &input.lights, input.sky);
-    report.triangles = scene.triangles.iter().filter(|triangle| !triangle.superseded).count();
+    report.triangles = scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate).count();
     Ok((scene, layout, emitters))
 }
 
@@ -63,10 +63,11 @@ pub(crate) fn sources<'a>(
     input: &StaticScene,
     scene: &'a BakeScene,
     emitters: Vec<Emitter>,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<Sources<'a>, BakeError> {
-    let sources = watch.during(0.9, || Sources::new(scene, emitters, input.lights.clone(), input.sky))?;
+    let sources =
+        monitor.run_interruptible(0.9, || Sources::new(scene, emitters, input.lights.clone(), input.sky))?;
     if sources.is_empty() {
         return Ok(sources);
     }
@@ -79,6 +80,6 @@ pub(crate) fn sources<'a>(
     if sources.lights.is_empty() {
         report.skipped.push("punctual light: no point, spot or directional light is static or mixed".into());
     }
-    report.warnings.extend(watch.during(1.0, || coarse_textures(scene))?);
+    report.warnings.extend(monitor.run_interruptible(1.0, || coarse_textures(scene))?);
     Ok(sources)
 }

@@ -24,14 +24,14 @@
 //! The header is written beside and renamed. Blocks are appended, each value once; a block that a crash has cut short fails its checksum,
 //! and the bake goes on from the one before.
 
+pub(crate) mod checkpoint_file;
 pub(crate) mod record;
-pub(crate) mod tape;
 
 use std::path::PathBuf;
 use std::time::Duration;
 
+pub(crate) use checkpoint_file::CheckpointFile;
 pub(crate) use record::Record;
-pub(crate) use tape::Tape;
 
 /// The version of the format: another is not read.
 const VERSION: u32 = 3;
@@ -61,7 +61,7 @@ impl Checkpoint {
     /// # Errors
     /// What the system says, unless there is no such file.
     pub fn remove(&self) -> std::io::Result<()> {
-        tape::remove_if_there(&tape::temporary(&self.path))?;
-        tape::remove_if_there(&self.path)
+        checkpoint_file::remove_if_there(&checkpoint_file::temporary(&self.path))?;
+        checkpoint_file::remove_if_there(&self.path)
     }
 }

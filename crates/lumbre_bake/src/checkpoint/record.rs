@@ -28,8 +28,8 @@ mod tests {
 
     use super::*;
     use crate::radiosity::patch_index::PatchIndex;
-    use crate::radiosity::ray_counts::Cast;
-    use crate::sources::direct::{Direct, Seen};
+    use crate::radiosity::ray_counts::PatchRayCounts;
+    use crate::sources::direct::{Direct, VisibilitySummary};
 
     #[test]
     fn what_is_written_is_read_to_the_last_bit() {
@@ -40,26 +40,26 @@ mod tests {
             caution: 0.05,
             rays: 7,
             sampled: true,
-            seen: Seen { partly: true, signature: 0xdead_beef },
+            seen: VisibilitySummary { partly: true, signature: 0xdead_beef },
         };
-        let cast = Cast {
-            met: [vec![(PatchIndex(1), 2), (PatchIndex(3), u32::MAX)], vec![]],
+        let cast = PatchRayCounts {
+            hits: [vec![(PatchIndex(1), 2), (PatchIndex(3), u32::MAX)], vec![]],
             inside: [5, 6],
             missed: [7, 8],
             count: [9, 10],
         };
         let bytes = written(&(direct, cast.clone())).unwrap();
-        let (again, cast_again): (Direct, Cast) = read(&bytes).unwrap();
+        let (again, cast_again): (Direct, PatchRayCounts) = read(&bytes).unwrap();
         let bits = |v: Vec3| v.to_array().map(f32::to_bits);
         assert_eq!((bits(again.baked), bits(again.mixed)), (bits(direct.baked), bits(direct.mixed)));
         assert_eq!((again.rays, again.sampled, again.seen), (direct.rays, direct.sampled, direct.seen));
-        assert_eq!((&cast_again.met, cast_again.inside), (&cast.met, cast.inside));
+        assert_eq!((&cast_again.hits, cast_again.inside), (&cast.hits, cast.inside));
         assert_eq!((cast_again.missed, cast_again.count), (cast.missed, cast.count));
         // Whatever is cut off or too much is missed.
         for end in 0..bytes.len() {
-            assert!(read::<(Direct, Cast)>(&bytes[..end]).is_none(), "{end}");
+            assert!(read::<(Direct, PatchRayCounts)>(&bytes[..end]).is_none(), "{end}");
         }
-        assert!(read::<(Direct, Cast)>(&[bytes, vec![0]].concat()).is_none());
+        assert!(read::<(Direct, PatchRayCounts)>(&[bytes, vec![0]].concat()).is_none());
     }
 
     #[test]

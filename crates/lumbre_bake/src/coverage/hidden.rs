@@ -10,7 +10,7 @@ use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiv
 use super::tiles::{Tiles, area, positions_of};
 use crate::BakeError;
 use crate::chunks::in_chunks;
-use crate::progress::{Clock, Watch};
+use crate::monitor::{BakeMonitor, Clock};
 use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::texel_index::MapTexel;
@@ -49,10 +49,10 @@ pub(crate) fn remove_hidden(
     texels: &mut [Texel],
     crossed: impl Iterator<Item = MapTexel>,
     touched: &[MapTexel],
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
 ) -> Result<(usize, u64), BakeError> {
-    let clock = watch.clock().until(CLOSELY);
-    let (odd, mut rays) = odd(scene, texels, clock, watch)?;
+    let clock = monitor.clock().until(CLOSELY);
+    let (odd, mut rays) = odd(scene, texels, clock, monitor)?;
     // Six rays may miss a corner of a texel; its neighbours' rays did not.
     let mut near = vec![false; layout.texels];
     touched.iter().for_each(|texel| near[texel.place()] = true);
@@ -67,17 +67,17 @@ pub(crate) fn remove_hidden(
         }
     }
     let mut suspects: Vec<&mut Texel> = texels.iter_mut().filter(|texel| near[texel.index.place()]).collect();
-    watch.pass(PASSES[1]);
-    let judged = in_chunks(suspects.len(), watch, |place| {
+    monitor.pass(PASSES[1]);
+    let judged = in_chunks(suspects.len(), monitor, |place| {
         let texel = &*suspects[place];
-        if place >= ALWAYS_CLOSELY && clock.late() {
+        if place >= ALWAYS_CLOSELY && clock.is_over() {
             judge_roughly(scene, texel)
         } else {
             judge(scene, texel, mixed[texel.index.place()])
         }
     })?;
     rays += judged.iter().map(|judged| u64::from(judged.rays)).sum::<u64>();
-    let hidden = watch.during(1.0, || {
+    let hidden = monitor.run_interruptible(1.0, || {
         let pairs = suspects.par_iter_mut().zip(&judged);
         pairs.map(|(texel, judged)| usize::from(keep_open(scene, texel, judged))).sum()
     })?;
@@ -97,14 +97,14 @@ fn odd(
     scene: &BakeScene,
     texels: &[Texel],
     clock: Clock,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
 ) -> Result<(Vec<bool>, u64), BakeError> {
     let tiles = Tiles::new(texels);
-    let suspect = watch.during(0.0, || suspect(scene, texels, &tiles))?;
+    let suspect = monitor.run_interruptible(0.0, || suspect(scene, texels, &tiles))?;
     let suspects = |place: usize| suspect[tiles.tile_of[place] as usize];
-    watch.pass(PASSES[0]);
-    let odd = in_chunks(texels.len(), watch, |place| {
-        let probes = if place >= ALWAYS_CLOSELY && clock.late() { LATE_PROBES } else { PROBES };
+    monitor.pass(PASSES[0]);
+    let odd = in_chunks(texels.len(), monitor, |place| {
+        let probes = if place >= ALWAYS_CLOSELY && clock.is_over() { LATE_PROBES } else { PROBES };
         suspects(place) && looks_odd(scene, &texels[place], probes)
     })?;
     let asked = (0..texels.len()).filter(|&place| suspects(place)).count();

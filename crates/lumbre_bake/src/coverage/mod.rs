@@ -3,8 +3,8 @@
 pub(crate) mod blocks;
 pub(crate) mod charts;
 pub(crate) mod covered_texels;
+pub(crate) mod divided_texels;
 pub(crate) mod footprint;
 pub(crate) mod hidden;
-pub(crate) mod straddling;
 pub(crate) mod tile_sequence;
 pub(crate) mod tiles;

@@ -2,9 +2,9 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::lanes::{Strips, lanes};
 use super::neighbours::Block;
 use super::plane::{HALF, VALUES};
+use super::texel_rows::{ChannelRows, lanes};
 use crate::denoise::filter_pass::Smoothed;
 use crate::denoise::kernel::Kernel;
 use crate::denoise::replicates::REPLICATES;
@@ -26,7 +26,7 @@ impl Kernel<1> for Variances<'_> {
 #[inline(always)]
 pub(crate) fn own_values<const N: usize, S: Simd>(
     block: &Block<'_, S>,
-    strips: &Strips<N>,
+    strips: &ChannelRows<N>,
 ) -> [f32x8<S>; VALUES] {
     let mut values = [block.simd.splat_f32x8(0.0); VALUES];
     for (place, value) in values.iter_mut().enumerate() {
@@ -55,7 +55,7 @@ pub(crate) struct Features<'a, const STEP: usize> {
     /// Reach of the means that tell edges, in steps.
     pub steps: usize,
     pub estimates: &'a Smoothed,
-    pub variances: &'a Strips<1>,
+    pub variances: &'a ChannelRows<1>,
 }
 /// The channels for the weights of each half, and the noise.
 pub(crate) const FEATURES: usize = 2 * 3 + 1;

@@ -1,14 +1,14 @@
 //! One pass of the smoothing over all texels: how far it reaches, and what it hands to the next. Not what it computes.
 
-use super::lanes::Strips;
 use super::plane::VALUES;
+use super::texel_rows::ChannelRows;
 
 /// The channels of the estimates, and the squared bias, mean of the channels.
-pub(crate) type Smoothed = Strips<{ VALUES + 1 }>;
+pub(crate) type Smoothed = ChannelRows<{ VALUES + 1 }>;
 pub(crate) const BIAS: usize = VALUES;
 
 /// One pass over all texels.
-pub(crate) struct Level {
+pub(crate) struct FilterPass {
     /// Texels at which a neighbour weighs e⁻¹; and where things are near, the share of their harmonic mean distance, inverted.
     pub width: f32,
     pub near: f32,

@@ -1,10 +1,10 @@
-//! Kernels: what is computed of eight covered texels side by side, over all rows. Not the rows: those are `lanes`; nor what is computed.
+//! Kernels: what is computed of eight covered texels side by side, over all rows. Not the rows: those are `texel_rows`; nor what is computed.
 
 use fearless_simd::{Level, Select, Simd, dispatch, f32x8, prelude::*, u32x8};
 
-use super::lanes::{Grid, LANES, MARGIN, Strips, lanes, window};
 use super::neighbours::Block;
 use super::surface::NONE;
+use super::texel_rows::{ChannelRows, LANES, MARGIN, TexelRows, lanes, window};
 
 /// Something to be computed of eight texels.
 pub(crate) trait Kernel<const N: usize>: Sync {
@@ -12,16 +12,16 @@ pub(crate) trait Kernel<const N: usize>: Sync {
     fn at<S: Simd>(&self, block: &Block<'_, S>, before: &[f32x8<S>; N]) -> [f32x8<S>; N];
 }
 
-impl Grid {
+impl TexelRows {
     /// What a kernel makes of all covered texels.
-    pub fn compute<const N: usize>(&self, kernel: &impl Kernel<N>) -> Strips<N> {
+    pub fn compute<const N: usize>(&self, kernel: &impl Kernel<N>) -> ChannelRows<N> {
         let mut strips = self.strips();
         self.change(&mut strips, kernel);
         strips
     }
 
     /// What a kernel makes of all covered texels, in place of what was there.
-    pub fn change<const N: usize>(&self, strips: &mut Strips<N>, kernel: &impl Kernel<N>) {
+    pub fn change<const N: usize>(&self, strips: &mut ChannelRows<N>, kernel: &impl Kernel<N>) {
         self.by_rows(strips, |index, strip| {
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
             if let Some(simd) = self.level.as_avx2() {

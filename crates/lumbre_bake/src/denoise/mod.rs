@@ -1,14 +1,15 @@
 //! Smoothing of what was sampled, over texels of one surface, and what that costs in bias. Not the samples.
 
+pub(crate) mod box_sums;
 pub(crate) mod filter_features;
 pub(crate) mod filter_pass;
 pub(crate) mod kernel;
-pub(crate) mod lanes;
+pub(crate) mod neighbourhoods;
 pub(crate) mod neighbours;
 pub(crate) mod plane;
 pub(crate) mod replicates;
 pub(crate) mod smooth;
 pub(crate) mod smoothing_bias;
 pub(crate) mod surface;
-pub(crate) mod surroundings;
+pub(crate) mod texel_rows;
 pub(crate) mod weighted_fit;

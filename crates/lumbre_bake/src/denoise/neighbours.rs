@@ -2,13 +2,12 @@
 
 use fearless_simd::{Select, Simd, f32x8, mask32x8, prelude::*, u32x8};
 
-use super::lanes::{Grid, LANES, MARGIN, MapRow, Strips, WINDOW, lanes, window};
-use crate::denoise::kernel::Kernel;
+use super::texel_rows::{ChannelRows, LANES, MARGIN, MapRow, TexelRows, WINDOW, lanes, window};
 use crate::denoise::surface::{NONE, goes_on};
 
 /// Eight texels side by side, at least the first of them covered.
 pub(crate) struct Block<'g, S: Simd> {
-    grid: &'g Grid,
+    grid: &'g TexelRows,
     pub simd: S,
     row: usize,
     column: usize,
@@ -22,8 +21,8 @@ pub(crate) struct Block<'g, S: Simd> {
 pub(crate) struct Beside<'g> {
     /// Rows from the texels' own to it.
     pub down: i64,
-    row: &'g MapRow,
-    column: usize,
+    pub row: &'g MapRow,
+    pub column: usize,
     ground: &'g [u32; WINDOW],
 }
 
@@ -33,14 +32,14 @@ pub(crate) const OWN: usize = MARGIN;
 impl<'g, S: Simd> Block<'g, S> {
     /// In a row of the grid, from a column on.
     #[inline(always)]
-    pub fn new(grid: &'g Grid, simd: S, row: usize, column: usize) -> Self {
+    pub fn new(grid: &'g TexelRows, simd: S, row: usize, column: usize) -> Self {
         let own: u32x8<S> = lanes(simd, window(&grid.ground, grid.rows[row].start + column), OWN);
         Self { grid, simd, row, column, own, alike: own.simd_eq(own[0]).all_true() }
     }
 
     /// What strips hold of the texels themselves.
     #[inline(always)]
-    pub fn own<const N: usize>(&self, strips: &Strips<N>, channel: usize) -> f32x8<S> {
+    pub fn own<const N: usize>(&self, strips: &ChannelRows<N>, channel: usize) -> f32x8<S> {
         let row = &self.grid.rows[self.row];
         let at = N * row.start + channel * row.stride + self.column;
         lanes(self.simd, window(&strips.values, at), OWN)
@@ -134,7 +133,7 @@ impl<'g, S: Simd> Block<'g, S> {
     #[inline(always)]
     pub fn mean<const N: usize>(
         &self,
-        strips: &Strips<N>,
+        strips: &ChannelRows<N>,
         channel: usize,
         steps: usize,
         step: usize,
@@ -146,41 +145,6 @@ impl<'g, S: Simd> Block<'g, S> {
             |beside, at| [lanes(self.simd, strips.beside(beside, channel), at)],
         );
         sums[0] / count.max(1.0)
-    }
-}
-
-/// Sums over neighbours.
-pub(crate) struct BoxSums<'a, const N: usize> {
-    pub of: &'a Strips<N>,
-    pub steps: usize,
-    pub step: usize,
-}
-
-impl<const N: usize> Kernel<N> for BoxSums<'_, N> {
-    #[inline(always)]
-    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; N]) -> [f32x8<S>; N] {
-        let (sums, _) = block.sums(
-            self.steps,
-            self.step,
-            #[inline(always)]
-            |beside, at| {
-                let mut terms = [block.simd.splat_f32x8(0.0); N];
-                for (channel, term) in terms.iter_mut().enumerate() {
-                    *term = lanes(block.simd, self.of.beside(beside, channel), at);
-                }
-                terms
-            },
-        );
-        sums
-    }
-}
-
-impl<const N: usize> Strips<N> {
-    /// What eight texels see of a channel in a row.
-    #[inline(always)]
-    pub fn beside(&self, beside: &Beside<'_>, channel: usize) -> &[f32; WINDOW] {
-        let row = beside.row;
-        window(&self.values, N * row.start + channel * row.stride + beside.column)
     }
 }
 
@@ -204,7 +168,7 @@ pub(crate) mod tests {
     }
 
     /// Maps in tiles of random surfaces, of which some go on and some do not, with holes; as these instructions compute them.
-    pub(crate) fn random_grid(level: Level) -> Grid {
+    pub(crate) fn random_grid(level: Level) -> TexelRows {
         let surface =
             |chart, x: f32, y: f32| Surface { chart, normal: Vec3::new(x, y, 0.0).normalize(), group: 0 };
         let surfaces =
@@ -220,13 +184,13 @@ pub(crate) mod tests {
                 ground.push(if hole { NONE } else { tiles[tile as usize] });
             }
         }
-        let mut grid = Grid::new(SIZES.into_iter(), ground.into_iter(), surfaces);
+        let mut grid = TexelRows::new(SIZES.into_iter(), ground.into_iter(), surfaces);
         grid.level = level;
         grid
     }
 
     /// Random numbers of all covered texels.
-    pub(crate) fn random_strips<const N: usize>(grid: &Grid, seed: u64) -> Strips<N> {
+    pub(crate) fn random_strips<const N: usize>(grid: &TexelRows, seed: u64) -> ChannelRows<N> {
         grid.fill(|row, column| {
             let mut state = seed ^ ((row * 1000 + column) as u64) << 20;
             std::array::from_fn(|_| random(&mut state))
@@ -234,7 +198,7 @@ pub(crate) mod tests {
     }
 
     struct Means<'a> {
-        of: &'a Strips<2>,
+        of: &'a ChannelRows<2>,
         steps: usize,
         step: usize,
     }
@@ -251,8 +215,8 @@ pub(crate) mod tests {
 
     /// By asking every texel within reach.
     fn direct_mean(
-        grid: &Grid,
-        of: &Strips<2>,
+        grid: &TexelRows,
+        of: &ChannelRows<2>,
         [row, column]: [usize; 2],
         steps: i64,
         step: i64,
@@ -287,7 +251,7 @@ pub(crate) mod tests {
     fn means_are_those_of_direct_sums_with_every_set_of_instructions() {
         for level in [Level::new(), Level::baseline()] {
             let grid = random_grid(level);
-            let of: Strips<2> = random_strips(&grid, 5);
+            let of: ChannelRows<2> = random_strips(&grid, 5);
             let mut texels = 0;
             for (steps, step) in [(0, 3), (1, 1), (1, 3), (2, 1), (2, 3), (3, 3), (4, 3), (12, 1)] {
                 let means = grid.compute(&Means { of: &of, steps, step });

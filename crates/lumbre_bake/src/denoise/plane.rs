@@ -2,8 +2,8 @@
 
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
-use super::lanes::{WINDOW, lanes};
 use super::neighbours::OWN;
+use super::texel_rows::{WINDOW, lanes};
 use crate::denoise::replicates::REPLICATES;
 
 /// Replicates of one half: the values of one plane.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::surroundings::Surroundings;
+use super::neighbourhoods::Neighbourhoods;
 use crate::squared_errors::SquaredErrors;
 
 /// Independent replicates per texel: their spread is the texel's error, apart from that of what they all read.
@@ -36,7 +36,7 @@ const BEYOND: f32 = 1.5;
 /// Variance of every texel's mean. Four replicates alone tell it badly: in one case of seven the mean is further than two of their standard errors
 /// from the truth (Student's t with three degrees of freedom); their neighbours' tell it too. Of a single texel the larger is stated, with so many
 /// standard errors of the neighbours' mean, since rays end where it is small by chance; over many texels the neighbours' mean is right.
-pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> SquaredErrors {
+pub(crate) fn spread(neighbourhoods: &Neighbourhoods<'_>, estimates: &[Estimates]) -> SquaredErrors {
     let own: Vec<f32> = estimates.par_iter().map(|e| variance(e).element_sum() / 3.0).collect();
     // The replicates of a half are smoothed by the same weights: what those bring by chance, only the halves tell.
     let halves: Vec<f32> = estimates
@@ -47,7 +47,7 @@ pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -
         })
         .collect();
     let numbers = |index: usize| [1.0, own[index], own[index] * own[index], halves[index]];
-    let sums = surroundings.sums(numbers, SPREAD_STEPS, SPREAD_STEP);
+    let sums = neighbourhoods.sums(numbers, SPREAD_STEPS, SPREAD_STEP);
     let both = |([count, sum, squares, of_halves], own): ([f32; 4], &f32)| {
         let mean = (sum / count.max(1.0)).max(of_halves / count.max(1.0));
         (own.max(mean + BEYOND * standard_error([count, sum, squares])), mean)

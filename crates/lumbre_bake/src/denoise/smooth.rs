@@ -3,7 +3,7 @@
 //! In levels: the second takes what the first has made of every third texel, and so reaches three times as far for the same work
 //! (Dammertz, Sewtz, Hanika and Lensch, "Edge-Avoiding À-Trous Wavelet Transform", 2010).
 
-use crate::denoise::filter_pass::{BIAS, Level, Smoothed};
+use crate::denoise::filter_pass::{BIAS, FilterPass, Smoothed};
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -11,12 +11,12 @@ use rayon::prelude::*;
 use super::filter_features::{
     FEATURES, Features, NOISE, NOISE_STEPS, Variances, own_values, sum_of_variances,
 };
-use super::lanes::{Grid, Strips};
+use super::neighbourhoods::Neighbourhoods;
 use super::neighbours::Block;
 use super::plane::VALUES;
 use super::replicates::Estimates;
 use super::smoothing_bias::{Products, squared_bias};
-use super::surroundings::Surroundings;
+use super::texel_rows::{ChannelRows, TexelRows};
 use super::weighted_fit::Fit;
 use crate::denoise::kernel::Kernel;
 
@@ -24,26 +24,26 @@ use crate::denoise::kernel::Kernel;
 /// the first: four times the variance of a texel for one replicate, a ninth of it in a block, of which the radius holds 49/9, twice for
 /// two halves: 4 / 9 / sqrt(2 * 49 / 9). What the second takes in goes together over some 20 texels: its blocks hold four
 /// that do not, and the radius as many blocks.
-const FIRST: Level = Level { width: 2.5, near: 1.0, guide_steps: 1, chance: 0.135 };
-const SECOND: Level = Level { width: 9.0, near: 12.0, guide_steps: 0, chance: 0.33 };
+const FIRST: FilterPass = FilterPass { width: 2.5, near: 1.0, guide_steps: 1, chance: 0.135 };
+const SECOND: FilterPass = FilterPass { width: 9.0, near: 12.0, guide_steps: 0, chance: 0.33 };
 
 /// The estimates of every covered texel, smoothed, and the squared bias that the smoothing may have brought, mean of the channels.
 /// `inverse_distances` tells how near to each texel the things are that it gathered from.
 pub(crate) fn smooth(
-    surroundings: &Surroundings<'_>,
+    neighbourhoods: &Neighbourhoods<'_>,
     estimates: &[Estimates],
     inverse_distances: &[f32],
 ) -> (Vec<Estimates>, Vec<f32>) {
-    let grid = surroundings.grid();
-    let things: Strips<2> = surroundings
-        .fill(|index| [inverse_distances[index], surroundings.texel_side(&surroundings.texels[index])]);
-    let mut smoothed: Smoothed = surroundings.fill(|index| {
+    let grid = neighbourhoods.grid();
+    let things: ChannelRows<2> = neighbourhoods
+        .fill(|index| [inverse_distances[index], neighbourhoods.texel_side(&neighbourhoods.texels[index])]);
+    let mut smoothed: Smoothed = neighbourhoods.fill(|index| {
         let estimates = &estimates[index];
         std::array::from_fn(|place| if place < BIAS { estimates[place / 3][place % 3] } else { 0.0 })
     });
     smooth_strips(grid, things, &mut smoothed);
-    let found = surroundings.read(&smoothed).into_par_iter();
-    let of_texels = found.zip(surroundings.texels).zip(estimates).map(|((found, texel), estimates)| {
+    let found = neighbourhoods.read(&smoothed).into_par_iter();
+    let of_texels = found.zip(neighbourhoods.texels).zip(estimates).map(|((found, texel), estimates)| {
         let smoothed = std::array::from_fn(|replicate| Vec3::from_slice(&found[3 * replicate..]));
         if texel.is_hidden() { (*estimates, 0.0) } else { (smoothed, found[BIAS]) }
     });
@@ -51,20 +51,20 @@ pub(crate) fn smooth(
 }
 
 /// The same of strips: `things` holds how near things are and the texels' sides.
-fn smooth_strips(grid: &Grid, things: Strips<2>, estimates: &mut Smoothed) {
+fn smooth_strips(grid: &TexelRows, things: ChannelRows<2>, estimates: &mut Smoothed) {
     let nearness = grid.compute(&Nearness(&things));
     drop(things);
     FIRST.smooth::<1, 7>(grid, estimates, &nearness);
     SECOND.smooth::<3, 9>(grid, estimates, &nearness);
 }
 
-impl Level {
+impl FilterPass {
     /// Smooths the estimates, and adds the squared bias that this brought; a texel to which it brings more than it takes away stays as it is.
     fn smooth<const STEP: usize, const COLUMNS: usize>(
         &self,
-        grid: &Grid,
+        grid: &TexelRows,
         estimates: &mut Smoothed,
-        nearness: &Strips<1>,
+        nearness: &ChannelRows<1>,
     ) {
         let variances = grid.compute(&Variances(estimates));
         let features =
@@ -80,7 +80,7 @@ impl Level {
 }
 
 /// How near the things are that a texel sees: its side over their harmonic mean distance, squared.
-struct Nearness<'a>(&'a Strips<2>);
+struct Nearness<'a>(&'a ChannelRows<2>);
 
 impl Kernel<1> for Nearness<'_> {
     #[inline(always)]
@@ -94,10 +94,10 @@ impl Kernel<1> for Nearness<'_> {
 
 /// What was smoothed where that helps; and the squared bias of both levels together.
 struct Choice<'a, const STEP: usize> {
-    level: &'a Level,
-    smoothed: &'a Strips<VALUES>,
-    features: &'a Strips<FEATURES>,
-    products: &'a Strips<1>,
+    level: &'a FilterPass,
+    smoothed: &'a ChannelRows<VALUES>,
+    features: &'a ChannelRows<FEATURES>,
+    products: &'a ChannelRows<1>,
 }
 
 impl<const STEP: usize> Kernel<{ VALUES + 1 }> for Choice<'_, STEP> {

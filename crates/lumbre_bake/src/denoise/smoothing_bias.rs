@@ -3,9 +3,9 @@
 use fearless_simd::{Simd, f32x8, prelude::*};
 
 use super::filter_features::own_values;
-use super::lanes::{Strips, lanes};
 use super::neighbours::Block;
 use super::plane::{OF_HALF, VALUES};
+use super::texel_rows::{ChannelRows, lanes};
 use crate::denoise::filter_pass::Smoothed;
 use crate::denoise::kernel::Kernel;
 
@@ -19,7 +19,7 @@ const BIAS_RADIUS: usize = 3;
 /// Blocks are of texels `STEP` apart.
 pub(crate) struct Products<'a, const STEP: usize> {
     pub raw: &'a Smoothed,
-    pub smoothed: &'a Strips<VALUES>,
+    pub smoothed: &'a ChannelRows<VALUES>,
 }
 
 impl<const STEP: usize> Kernel<1> for Products<'_, STEP> {
@@ -67,6 +67,10 @@ impl<const STEP: usize> Kernel<1> for Products<'_, STEP> {
 
 /// The mean of the products around.
 #[inline(always)]
-pub(crate) fn squared_bias<S: Simd>(block: &Block<'_, S>, step: usize, products: &Strips<1>) -> f32x8<S> {
+pub(crate) fn squared_bias<S: Simd>(
+    block: &Block<'_, S>,
+    step: usize,
+    products: &ChannelRows<1>,
+) -> f32x8<S> {
     block.mean(products, 0, BIAS_RADIUS, step)
 }

@@ -3,20 +3,20 @@
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
 use super::filter_features::{FEATURES, NOISE, own_values};
-use super::lanes::{Strips, lanes};
 use super::neighbours::{Beside, Block, OWN};
 use super::plane::{HALF, Planes, VALUES};
-use crate::denoise::filter_pass::{Level, Smoothed};
+use super::texel_rows::{ChannelRows, lanes};
+use crate::denoise::filter_pass::{FilterPass, Smoothed};
 use crate::denoise::kernel::Kernel;
 
 /// Squared differences of this many variances weigh e⁻¹.
 const GUIDE_SIGMAS: f32 = 8.0;
 /// The weighted planes, over so many texels a row, `STEP` apart, and as many rows.
 pub(crate) struct Fit<'a, const STEP: usize, const COLUMNS: usize> {
-    pub level: &'a Level,
+    pub level: &'a FilterPass,
     pub estimates: &'a Smoothed,
-    pub nearness: &'a Strips<1>,
-    pub features: &'a Strips<FEATURES>,
+    pub nearness: &'a ChannelRows<1>,
+    pub features: &'a ChannelRows<FEATURES>,
 }
 
 impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, COLUMNS> {
@@ -125,8 +125,8 @@ fn falloff<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
 mod tests {
     use fearless_simd::Level as Instructions;
 
-    use super::super::lanes::{LANES, MARGIN};
     use super::super::neighbours::tests::{random_grid, random_strips};
+    use super::super::texel_rows::{LANES, MARGIN};
     use super::*;
     use crate::denoise::surface::{NONE, goes_on};
 
@@ -160,9 +160,9 @@ mod tests {
     #[test]
     fn the_fit_is_the_plane_of_weighted_least_squares() {
         let grid = random_grid(Instructions::new());
-        let level = Level { width: 9.0, near: 0.5, guide_steps: 0, chance: 0.0 };
+        let level = FilterPass { width: 9.0, near: 0.5, guide_steps: 0, chance: 0.0 };
         let (estimates, nearness) = (random_strips(&grid, 1), random_strips(&grid, 2));
-        let features: Strips<FEATURES> = random_strips(&grid, 3);
+        let features: ChannelRows<FEATURES> = random_strips(&grid, 3);
         let fit: Fit<'_, 3, 9> =
             Fit { level: &level, estimates: &estimates, nearness: &nearness, features: &features };
         let found = grid.compute(&fit);

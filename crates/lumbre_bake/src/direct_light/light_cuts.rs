@@ -76,7 +76,7 @@ impl LightCuts {
 
     /// Whether some texel has sources that share samples.
     pub fn share_samples(&self) -> bool {
-        self.cuts.iter().any(|cut| !cut.rest.is_empty())
+        self.cuts.iter().any(|cut| !cut.shared.is_empty())
     }
 
     /// Of each covered texel a number for the sources that have samples of their own there.

@@ -101,7 +101,7 @@ fn visibility(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> Option<Li
         }
     };
     let Some(shaft) = shaft else { return Some(LightVisibility::Dark) };
-    let blockers = shaft.triangles(scene, MOST_BLOCKERS)?;
+    let blockers = shaft.triangles(scene, MAX_BLOCKERS)?;
     if blockers.is_empty() {
         return Some(LightVisibility::Clear);
     }
@@ -120,4 +120,4 @@ fn visibility(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> Option<Li
 }
 
 /// Most triangles whose shadows are looked at for one light: beyond, rays are quicker.
-const MOST_BLOCKERS: usize = 128;
+const MAX_BLOCKERS: usize = 128;

@@ -9,10 +9,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::BakeError;
-use crate::chunks::{in_chunks, in_chunks_anew};
+use crate::chunks::{in_chunks, in_chunks_uncheckpointed};
 use crate::coverage::blocks::Blocks;
 use crate::coverage::footprint::{Texel, receiver};
-use crate::progress::Watch;
+use crate::monitor::BakeMonitor;
 use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::Receiver;
 use crate::scene::material::Side;
@@ -73,7 +73,7 @@ impl LocalLight {
         texels: &[Texel],
         charts: &[u32],
         direct: &[Direct],
-        watch: &mut Watch<'_>,
+        monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
         let blocks = Blocks::new(texels, charts, BLOCK);
         let mut places = vec![u32::MAX; layout.texels];
@@ -81,10 +81,10 @@ impl LocalLight {
             places[texel.index.place()] = place as u32;
         }
         let level = Level { sources, layout, places, blocks: &blocks, direct };
-        // Kept in the checkpoint, so that a bake which goes on from there judges by the same light.
-        let clock = watch.clock();
-        let late = in_chunks(1, watch, |_| clock.late())?.contains(&true);
-        let walks: Vec<Vec<Walk>> = in_chunks_anew(blocks.members.len(), watch, |block| {
+        // ReusedGather in the checkpoint, so that a bake which goes on from there judges by the same light.
+        let clock = monitor.clock();
+        let late = in_chunks(1, monitor, |_| clock.is_over())?.contains(&true);
+        let walks: Vec<Vec<Walk>> = in_chunks_uncheckpointed(blocks.members.len(), monitor, |block| {
             let members = &blocks.members[block];
             let walks = match late {
                 _ if members.is_empty() => 0,

@@ -10,19 +10,19 @@ pub(crate) mod shared_light;
 
 use glam::Vec3;
 
-use crate::allocation::allot;
-use crate::chunks::{in_chunks, in_chunks_in_time};
+use crate::chunks::{in_chunks, in_chunks_until_deadline};
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Texel, receiver};
-use crate::denoise::surroundings::Surroundings;
+use crate::denoise::neighbourhoods::Neighbourhoods;
 use crate::direct_light::light_cuts::LightCuts;
 use crate::direct_light::local_light::LocalLight;
 use crate::direct_light::shafts::Shafts;
 use crate::direct_light::shared_light::SharedLight;
-use crate::progress::Watch;
+use crate::monitor::BakeMonitor;
+use crate::sample_allocation::allocate;
 use crate::sampling::{Sequence, Stream};
 use crate::scene::LightmapLayout;
-use crate::sources::direct::{Direct, Seen};
+use crate::sources::direct::{Direct, VisibilitySummary};
 use crate::sources::light_sources::Sources;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions, BakeReport};
@@ -58,16 +58,16 @@ pub(crate) fn direct_light(
     texels: &CoveredTexels<'_>,
     known: &[Option<Direct>],
     options: &BakeOptions,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<DirectLight, BakeError> {
     let scene = sources.scene;
     let CoveredTexels { layout, list: texels, charts, .. } = texels;
     let known = |texel: CoveredTexel| known.get(texel.place()).copied().flatten();
     let [few, many, most] = options.effort().direct;
-    let mut cuts = watch.during(1.0, || LightCuts::new(sources, texels, charts))?;
+    let mut cuts = monitor.run_interruptible(1.0, || LightCuts::new(sources, texels, charts))?;
     let wanted = |texel: CoveredTexel| known(texel).is_none();
-    let shafts = watch.during(1.0, || Shafts::new(scene, sources, texels, &cuts, wanted))?;
+    let shafts = monitor.run_interruptible(1.0, || Shafts::new(scene, sources, texels, &cuts, wanted))?;
     // Where rays would have to tell, one to any of the sources tells as much as one to each.
     cuts.share(sources, &shafts.unresolved(&cuts));
     let cuts = cuts;
@@ -77,16 +77,20 @@ pub(crate) fn direct_light(
             return Direct::default();
         }
         let sequence = Sequence::new(options.seed, Stream::DirectLight, texel.index.0);
-        sources.own(cuts.of(place), &shafts.visibility(place, texel), sequence, samples, &|x, y| {
-            texel.point(scene, x, y).map(|point| receiver(scene, &point))
-        })
+        sources.irradiance_per_source(
+            cuts.of(place),
+            &shafts.visibility(place, texel),
+            sequence,
+            samples,
+            &|x, y| texel.point(scene, x, y).map(|point| receiver(scene, &point)),
+        )
     };
     // A complete map first, whatever time it takes.
-    let clock = watch.clock();
-    watch.pass(PASS);
+    let clock = monitor.clock();
+    monitor.pass(PASS);
     let unknown: Vec<CoveredTexel> = CoveredTexel::all(texels.len()).filter(|&texel| wanted(texel)).collect();
-    let found = in_chunks(unknown.len(), watch, |place| {
-        light(unknown[place], if clock.late() { few.min(LATE) } else { few })
+    let found = in_chunks(unknown.len(), monitor, |place| {
+        light(unknown[place], if clock.is_over() { few.min(LATE) } else { few })
     })?;
     let mut direct: Vec<Direct> =
         CoveredTexel::all(texels.len()).map(|texel| known(texel).unwrap_or_default()).collect();
@@ -99,16 +103,16 @@ pub(crate) fn direct_light(
             // What is known has no samples that others could be compared with.
             let keys = cuts.keys().into_iter().enumerate();
             let groups: Vec<u32> = keys.map(|(place, key)| 2 * key + u32::from(wanted(place))).collect();
-            let surroundings = Surroundings::new(scene, layout, texels, charts, &groups);
-            watch.pass(PASS);
-            Some(SharedLight::new(sources, surroundings, &cuts, wanted, options, watch)?)
+            let neighbourhoods = Neighbourhoods::new(scene, layout, texels, charts, &groups);
+            monitor.pass(PASS);
+            Some(SharedLight::new(sources, neighbourhoods, &cuts, wanted, options, monitor)?)
         }
         false => None,
     };
-    watch.pass(PASS_OF_LOCAL_LIGHT);
+    monitor.pass(PASS_OF_LOCAL_LIGHT);
     let so_far = shared.as_ref().map(|shared| shared.with(&direct));
     let local = so_far.as_ref().unwrap_or(&direct);
-    let local = LocalLight::new(sources, layout, texels, charts, local, watch)?;
+    let local = LocalLight::new(sources, layout, texels, charts, local, monitor)?;
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
     let asked = open * options.error.powi(2);
     // Shared samples are mostly cheaper than rays of the gather, so that direct light is held to a smaller share of the error.
@@ -118,8 +122,8 @@ pub(crate) fn direct_light(
 
     let mut again = in_doubt(layout, texels, &direct);
     again.retain(|&texel| wanted(texel) && direct[texel.place()].sampled);
-    watch.pass(PASS);
-    let better = in_chunks_in_time(again.len(), watch, |place| light(again[place], many))?;
+    monitor.pass(PASS);
+    let better = in_chunks_until_deadline(again.len(), monitor, |place| light(again[place], many))?;
     replace(&mut direct, &again, better);
     // Then more where the error asked for is not in sight yet, in the shadows' edges mostly.
     let mut samples = vec![many; texels.len()];
@@ -128,9 +132,9 @@ pub(crate) fn direct_light(
         if sum(&relative) <= own_goal {
             break;
         }
-        let wanted = allot(again.iter().copied(), &relative, &samples, most, ORDER, own_goal);
-        watch.pass(PASS);
-        let better = in_chunks_in_time(wanted.len(), watch, |place| {
+        let wanted = allocate(again.iter().copied(), &relative, &samples, most, ORDER, own_goal);
+        monitor.pass(PASS);
+        let better = in_chunks_until_deadline(wanted.len(), monitor, |place| {
             light(wanted[place].texel, wanted[place].samples)
         })?;
         if better.is_empty() {
@@ -146,7 +150,7 @@ pub(crate) fn direct_light(
         let own = sum(&relative(&direct, &local));
         let goal = |share: f64| (asked * share - own).max(own_goal);
         let share = |samples: f64| if gathers { share_beside_gather(samples) } else { share };
-        shared.finish(&mut direct, &local, (share(0.0), &share), &goal, watch)?;
+        shared.finish(&mut direct, &local, (share(0.0), &share), &goal, monitor)?;
     }
     let new = unknown.iter().map(|texel| u64::from(direct[texel.place()].rays));
     report.rays += new.sum::<u64>();
@@ -157,7 +161,7 @@ pub(crate) fn direct_light(
 const OWN_SHARE: f64 = 0.35;
 /// The same where sources share samples, and a gather follows, at least and at most.
 const SHARED_SHARE: f64 = 0.2;
-const MOST_SHARED_SHARE: f64 = 0.5;
+const MAX_SHARED_SHARE: f64 = 0.5;
 /// What direct light and the gather may leave together.
 const BOTH: f64 = 0.85;
 /// What a gather takes: its rays for each texel times the share of the squared error that they leave. From 7 in a room to 30 in the demo level.
@@ -167,7 +171,7 @@ const GATHER: f64 = 30.0;
 /// with the samples, both take the fewest together where their shares are as the roots of what each takes.
 fn share_beside_gather(samples: f64) -> f64 {
     let (own, gather) = ((samples * SHARED_SHARE).sqrt(), GATHER.sqrt());
-    (BOTH * own / (own + gather)).clamp(SHARED_SHARE, MOST_SHARED_SHARE)
+    (BOTH * own / (own + gather)).clamp(SHARED_SHARE, MAX_SHARED_SHARE)
 }
 /// Order of the variance's fall with the samples at straight edges of shadows, as measured.
 const ORDER: f64 = 1.5;
@@ -198,7 +202,7 @@ fn replace(direct: &mut [Direct], at: &[CoveredTexel], better: Vec<Direct>) {
 
 /// Texels that saw a source partly, or near one that did, or next to one that saw other sources.
 fn in_doubt(layout: &LightmapLayout, texels: &[Texel], direct: &[Direct]) -> Vec<CoveredTexel> {
-    let mut seen: Vec<Option<Seen>> = vec![None; layout.texels];
+    let mut seen: Vec<Option<VisibilitySummary>> = vec![None; layout.texels];
     for (texel, direct) in texels.iter().zip(direct).filter(|(texel, _)| !texel.is_hidden()) {
         seen[texel.index.place()] = Some(direct.seen);
     }

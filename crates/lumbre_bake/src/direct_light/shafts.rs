@@ -14,14 +14,14 @@ use crate::scene::BakeScene;
 use crate::sources::light_cut::LightCut;
 use crate::sources::light_sources::Sources;
 use crate::texel_index::CoveredTexel;
-use crate::visibility::occluders::{PartOccluders, Visibility};
+use crate::visibility::occluders::{LampOccluders, Visibility};
 use crate::visibility::shadow_clipping::{LightVisibility, ReceiverShape};
 use crate::visibility::shaft::{Area, Shaft};
 
 /// What may stand between a tile and the sources.
 #[derive(Default)]
-struct OfTile {
-    parts: Vec<OfPart>,
+struct TileOccluders {
+    lamps: Vec<TileLampOccluders>,
     /// By the lights' numbers.
     lights: Vec<(u32, LightVisibility)>,
     /// A texel of it, by its place, that shows something: none if nobody wants to know.
@@ -29,8 +29,8 @@ struct OfTile {
 }
 
 /// What may stand between a tile and a part of the emissive surfaces, by numbers.
-struct OfPart {
-    part: u32,
+struct TileLampOccluders {
+    node: u32,
     emitters: Vec<(u32, Vec<u32>)>,
 }
 
@@ -38,7 +38,7 @@ struct OfPart {
 pub(crate) struct Shafts<'a> {
     scene: &'a BakeScene,
     sources: &'a Sources<'a>,
-    tiles: Vec<OfTile>,
+    tiles: Vec<TileOccluders>,
     /// The tile of each covered texel.
     tile_of: Vec<u32>,
 }
@@ -62,13 +62,13 @@ impl<'a> Shafts<'a> {
             .par_iter()
             .map(|members| {
                 if scene.stop.is_cancelled() || !members.iter().any(|&place| wanted(CoveredTexel(place))) {
-                    return OfTile::default();
+                    return TileOccluders::default();
                 }
                 let cut = cuts.of(members[0] as usize);
                 let asked = members.iter().copied().find(|&place| !texels[place as usize].is_hidden());
                 let members = || members.iter().map(|&place| &texels[place as usize]);
-                let found = shafts.of_tile(cut, members).unwrap_or_default();
-                OfTile { asked, ..found }
+                let found = shafts.tile_occluders(cut, members).unwrap_or_default();
+                TileOccluders { asked, ..found }
             })
             .collect();
         shafts
@@ -81,11 +81,11 @@ impl<'a> Shafts<'a> {
     }
 
     /// `None` where rays have to tell.
-    fn of_tile<'t, T: Iterator<Item = &'t Texel>>(
+    fn tile_occluders<'t, T: Iterator<Item = &'t Texel>>(
         &self,
         cut: &LightCut,
         members: impl Fn() -> T,
-    ) -> Option<OfTile> {
+    ) -> Option<TileOccluders> {
         let mut open = members().filter(|texel| !texel.is_hidden());
         let first = open.next()?;
         let mut positions = Vec::new();
@@ -94,9 +94,9 @@ impl<'a> Shafts<'a> {
         if !members().all(|texel| shows_plane(self.scene, texel, first.triangle)) {
             return None;
         }
-        let lamp = |&part: &u32| {
-            let emitters = self.sources.emitters_of(part);
-            if emitters.len() > MOST_EMITTERS {
+        let lamp = |&node: &u32| {
+            let emitters = self.sources.emitters_of(node);
+            if emitters.len() > MAX_EMITTERS {
                 return None;
             }
             let mut found = Vec::new();
@@ -105,14 +105,14 @@ impl<'a> Shafts<'a> {
                     return None;
                 }
                 if let Some(shaft) = self.shaft(&area, emitter) {
-                    found.push((emitter, shaft.triangles(self.scene, MOST_BLOCKERS)?));
+                    found.push((emitter, shaft.triangles(self.scene, MAX_BLOCKERS)?));
                 }
             }
-            Some(OfPart { part, emitters: found })
+            Some(TileLampOccluders { node, emitters: found })
         };
-        let parts = cut.lamps.iter().filter_map(lamp).collect();
+        let lamps = cut.lamps.iter().filter_map(lamp).collect();
         let lights = visibilities(self.sources, &cut.lights, &area, first.side(self.scene));
-        Some(OfTile { parts, lights, asked: None })
+        Some(TileOccluders { lamps, lights, asked: None })
     }
 
     /// Lamps that have samples of their own in blocks in most of whose tiles it is not known what may stand before them: a texel of the block,
@@ -127,7 +127,7 @@ impl<'a> Shafts<'a> {
             // Where all lamps have samples of their own the sum over them is exact, and only what is hidden of it is left to rays.
             let cut = cuts.of(asked as usize);
             for &lamp in cut.lamps.iter().filter(|_| !cut.all_apart) {
-                if tile.parts.iter().all(|part| part.part != lamp) {
+                if tile.lamps.iter().all(|occluders| occluders.node != lamp) {
                     open.entry((block, lamp)).or_insert((asked, 0)).1 += 1;
                 }
             }
@@ -147,9 +147,9 @@ impl<'a> Shafts<'a> {
         };
         let tile = &self.tiles[tile as usize];
         let (mut own, mut positions) = (None, Vec::new());
-        let one = |of_part: &OfPart| {
-            if of_part.emitters.iter().all(|(_, blockers)| blockers.is_empty()) {
-                return Some(PartOccluders { part: of_part.part, emitters: Vec::new() });
+        let one = |tile_lamp: &TileLampOccluders| {
+            if tile_lamp.emitters.iter().all(|(_, blockers)| blockers.is_empty()) {
+                return Some(LampOccluders { node: tile_lamp.node, emitters: Vec::new() });
             }
             if own.is_none() {
                 positions_of(self.scene, texel, &mut positions);
@@ -165,15 +165,15 @@ impl<'a> Shafts<'a> {
                 });
                 Some((*emitter, corners.collect()))
             };
-            let emitters: Vec<(u32, Vec<_>)> = of_part.emitters.iter().filter_map(narrowed).collect();
+            let emitters: Vec<(u32, Vec<_>)> = tile_lamp.emitters.iter().filter_map(narrowed).collect();
             let clear = emitters.iter().all(|(_, blockers)| blockers.is_empty());
-            Some(PartOccluders { part: of_part.part, emitters: if clear { Vec::new() } else { emitters } })
+            Some(LampOccluders { node: tile_lamp.node, emitters: if clear { Vec::new() } else { emitters } })
         };
-        let parts = tile.parts.iter().filter_map(one).collect();
+        let lamps = tile.lamps.iter().filter_map(one).collect();
         let in_shadow =
             tile.lights.iter().any(|(_, visibility)| matches!(visibility, LightVisibility::Shadows(..)));
         Visibility {
-            parts,
+            lamps,
             lights: &tile.lights,
             receiver_shape: in_shadow.then(|| receiver_shape(self.scene, texel)),
             square,
@@ -218,5 +218,5 @@ fn square(scene: &BakeScene, texel: &Texel) -> Option<[DVec3; 4]> {
 }
 
 /// Most triangles that may stand before an emitter, and most emitters of a lamp: beyond, rays are quicker.
-const MOST_BLOCKERS: usize = 32;
-const MOST_EMITTERS: usize = 8;
+const MAX_BLOCKERS: usize = 32;
+const MAX_EMITTERS: usize = 8;

@@ -8,18 +8,18 @@ use serde::{Deserialize, Serialize};
 
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
-use crate::allocation::{Allotment, allot_within};
-use crate::chunks::{in_chunks, in_chunks_in_time};
+use crate::chunks::{in_chunks, in_chunks_until_deadline};
 use crate::coverage::footprint::{Texel, receiver};
 use crate::coverage::tile_sequence::TileSequence;
+use crate::denoise::neighbourhoods::Neighbourhoods;
 use crate::denoise::replicates::spread;
 use crate::denoise::replicates::{Estimates, REPLICATES, mean};
 use crate::denoise::smooth::smooth;
-use crate::denoise::surroundings::Surroundings;
-use crate::progress::Watch;
+use crate::monitor::BakeMonitor;
+use crate::sample_allocation::{SampleAllocation, allocate_within};
 use crate::sampling::{Stream, hash};
 use crate::sources::direct::Direct;
-use crate::sources::light_cut::Rest;
+use crate::sources::light_cut::SharedSources;
 use crate::sources::light_sources::Sources;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions};
@@ -42,7 +42,7 @@ pub(crate) struct Shared {
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
 /// The most by which a round lowers what is left: the first estimates are rough, and a goal out of reach would take all that can be had.
-const MOST_OF_A_ROUND: f64 = 8.0;
+const MAX_OF_A_ROUND: f64 = 8.0;
 /// A round that leaves more than this of the squared error was the last, and one that leaves so many times what was asked: to smooth
 /// everything once more takes longer than what is left is worth.
 const STALLED: f64 = 0.9;
@@ -60,7 +60,15 @@ impl Shared {
     }
 
     /// Adds samples up to `samples` of each replicate.
-    fn add(&mut self, sources: &Sources<'_>, rest: &Rest, texel: &Texel, run: u32, samples: u32, seed: u32) {
+    fn add(
+        &mut self,
+        sources: &Sources<'_>,
+        shared: &SharedSources,
+        texel: &Texel,
+        run: u32,
+        samples: u32,
+        seed: u32,
+    ) {
         for (replicate, sum) in self.sums.iter_mut().enumerate() {
             let sequence = TileSequence::new(seed, Stream::SharedLight(replicate as u32), texel, run);
             for sample in self.samples..samples {
@@ -68,7 +76,7 @@ impl Shared {
                 let Some(point) = texel.point(sources.scene, x, y) else { continue };
                 let receiver = receiver(sources.scene, &point);
                 let [choice, u, v, _] = sequence.point(sample, 1);
-                let found = sources.sample(rest, &receiver, [choice, u, v]);
+                let found = sources.sample(shared, &receiver, [choice, u, v]);
                 *sum += found.baked;
                 self.mixed += found.mixed;
                 self.inverse_distances += found.inverse_distance;
@@ -84,7 +92,7 @@ pub(crate) struct SharedLight<'a> {
     sources: &'a Sources<'a>,
     texels: &'a [Texel],
     cuts: &'a LightCuts,
-    surroundings: Surroundings<'a>,
+    neighbourhoods: Neighbourhoods<'a>,
     options: &'a BakeOptions,
     /// Samples of each replicate: in the first round, and at most.
     first: u32,
@@ -99,28 +107,29 @@ impl<'a> SharedLight<'a> {
     /// [`BakeError::Cancelled`].
     pub fn new(
         sources: &'a Sources<'a>,
-        surroundings: Surroundings<'a>,
+        neighbourhoods: Neighbourhoods<'a>,
         cuts: &'a LightCuts,
         wanted: impl Fn(usize) -> bool + Sync,
         options: &'a BakeOptions,
-        watch: &mut Watch<'_>,
+        monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
-        let texels = surroundings.texels;
+        let texels = neighbourhoods.texels;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
-        let mut light = Self { sources, texels, cuts, surroundings, options, first, most, found: Vec::new() };
+        let mut light =
+            Self { sources, texels, cuts, neighbourhoods, options, first, most, found: Vec::new() };
         // A complete map first, whatever time it takes; where that is limited, roughly.
-        let begun = watch.seconds();
+        let begun = monitor.seconds();
         let few = if options.time.is_some() { 1 } else { first };
-        light.found = in_chunks(texels.len(), watch, |place| {
+        light.found = in_chunks(texels.len(), monitor, |place| {
             let mut own = Shared::default();
             if wanted(place) {
                 light.add(place, &mut own, few);
             }
             own
         })?;
-        let samples = watch.clock().affordable(few, first, watch.seconds() - begun);
+        let samples = monitor.clock().affordable(few, first, monitor.seconds() - begun);
         if samples > few {
-            let more = in_chunks_in_time(texels.len(), watch, |place| {
+            let more = in_chunks_until_deadline(texels.len(), monitor, |place| {
                 let mut own = light.found[place];
                 if wanted(place) {
                     light.add(place, &mut own, samples);
@@ -133,11 +142,11 @@ impl<'a> SharedLight<'a> {
     }
 
     fn add(&self, place: usize, own: &mut Shared, samples: u32) {
-        let (texel, rest) = (&self.texels[place], &self.cuts.of(place).rest);
-        if !texel.is_hidden() && !rest.is_empty() {
+        let (texel, shared) = (&self.texels[place], &self.cuts.of(place).shared);
+        if !texel.is_hidden() && !shared.is_empty() {
             own.add(
                 self.sources,
-                rest,
+                shared,
                 texel,
                 self.first,
                 samples,
@@ -168,19 +177,19 @@ impl<'a> SharedLight<'a> {
         local: &LocalLight,
         (least, share): (f64, &impl Fn(f64) -> f64),
         goal: &impl Fn(f64) -> f64,
-        watch: &mut Watch<'_>,
+        monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
         let (mut before, mut chosen) = (f64::INFINITY, None);
         let (estimates, variances) = loop {
             let raw: Vec<Estimates> = self.found.par_iter().map(Shared::estimates).collect();
-            let (estimates, bias) = watch.during(1.0, || match self.options.denoise {
+            let (estimates, bias) = monitor.run_interruptible(1.0, || match self.options.denoise {
                 true => {
                     let near: Vec<f32> = self.found.par_iter().map(Shared::inverse_distance).collect();
-                    smooth(&self.surroundings, &raw, &near)
+                    smooth(&self.neighbourhoods, &raw, &near)
                 }
                 false => (raw, vec![0.0; self.found.len()]),
             })?;
-            let spread = watch.during(1.0, || spread(&self.surroundings, &estimates))?;
+            let spread = monitor.run_interruptible(1.0, || spread(&self.neighbourhoods, &estimates))?;
             let variances = spread.with(&bias);
             let relative = local.relative_errors(&variances);
             let asked = |texel: &CoveredTexel| self.found[texel.place()].samples > 0;
@@ -196,25 +205,25 @@ impl<'a> SharedLight<'a> {
             let budget = budget.saturating_sub(taken);
             // Samples are given out by the cautious figures; the goal is one of expected ones.
             let feared = summed(&relative.cautious) / left;
-            let allot = |goal: f64| -> Vec<Allotment> {
+            let allocate = |goal: f64| -> Vec<SampleAllocation> {
                 let asking = asking.clone();
-                allot_within(budget, asking, &relative.cautious, &samples, self.most, ORDER, feared * goal)
+                allocate_within(budget, asking, &relative.cautious, &samples, self.most, ORDER, feared * goal)
             };
             // Before the least share is in reach of a round, a few texels of which little is known hide what the others take.
-            if chosen.is_none() && left <= MOST_OF_A_ROUND * goal(least) {
-                let more = |own: &Allotment| u64::from(own.samples - samples[own.texel.place()]);
-                let foreseen = taken + allot(goal(least)).iter().map(more).sum::<u64>();
+            if chosen.is_none() && left <= MAX_OF_A_ROUND * goal(least) {
+                let more = |own: &SampleAllocation| u64::from(own.samples - samples[own.texel.place()]);
+                let foreseen = taken + allocate(goal(least)).iter().map(more).sum::<u64>();
                 chosen = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
             }
             let goal = goal(chosen.unwrap_or(least));
-            if left <= goal * ENOUGH || stalled || watch.clock().late() {
+            if left <= goal * ENOUGH || stalled || monitor.clock().is_over() {
                 break (estimates, variances);
             }
             before = left;
-            let wanted = allot(goal.max(left / MOST_OF_A_ROUND));
-            watch.pass(PASS);
-            let more = in_chunks_in_time(wanted.len(), watch, |index| {
-                let Allotment { texel, samples } = wanted[index];
+            let wanted = allocate(goal.max(left / MAX_OF_A_ROUND));
+            monitor.pass(PASS);
+            let more = in_chunks_until_deadline(wanted.len(), monitor, |index| {
+                let SampleAllocation { texel, samples } = wanted[index];
                 let mut own = self.found[texel.place()];
                 self.add(texel.place(), &mut own, samples);
                 own
@@ -222,8 +231,8 @@ impl<'a> SharedLight<'a> {
             if more.is_empty() {
                 break (estimates, variances);
             }
-            for (allotted, own) in wanted.iter().zip(more) {
-                self.found[allotted.texel.place()] = own;
+            for (allocated, own) in wanted.iter().zip(more) {
+                self.found[allocated.texel.place()] = own;
             }
         };
         for (place, (direct, own)) in direct.iter_mut().zip(&self.found).enumerate() {

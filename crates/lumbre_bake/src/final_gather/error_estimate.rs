@@ -6,9 +6,9 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::coverage::footprint::Texel;
+use crate::denoise::neighbourhoods::Neighbourhoods;
 use crate::denoise::replicates::{Estimates, mean};
-use crate::denoise::surroundings::Surroundings;
-use crate::final_gather::gathered::Gathered;
+use crate::final_gather::gather_sums::GatherSums;
 
 /// Texels around one over which checks are put together.
 const CHECK_RADIUS: usize = 3;
@@ -50,7 +50,7 @@ struct Checks {
 
 impl Checks {
     /// With the light by bounces that the checked texel's samples tell.
-    fn of(gathered: &Gathered, light: Vec3) -> Self {
+    fn of(gathered: &GatherSums, light: Vec3) -> Self {
         Self {
             count: f64::from(gathered.checks),
             difference: gathered.differences.as_dvec3(),
@@ -101,9 +101,9 @@ impl Checks {
 /// stays, with the scene's mean reflectance ρ. Samples that read a texel are not checked: the texel is a mean of samples that were, and so one
 /// bounce later, without d and with ρ times what else stays. Where a share s of a texel's samples read patches, s d is taken away, and of the rest s + (1 - s) ρ stays.
 pub(crate) fn patch_bias(
-    surroundings: &Surroundings<'_>,
+    neighbourhoods: &Neighbourhoods<'_>,
     texels: &[Texel],
-    gathered: &[Gathered],
+    gathered: &[GatherSums],
     raw: &[Estimates],
     reflectance: f64,
 ) -> Vec<PatchBias> {
@@ -123,7 +123,7 @@ pub(crate) fn patch_bias(
             known * mean * checks.count / checks.light.max(DVec3::splat(f64::MIN_POSITIVE))
         })
         .collect();
-    let around = |((texel, own), sums): ((&Texel, &Gathered), [f32; 8])| {
+    let around = |((texel, own), sums): ((&Texel, &GatherSums), [f32; 8])| {
         let checks = Checks::from_numbers(sums);
         if checks.count < 2.0 {
             return Unsmoothed::default();
@@ -145,12 +145,12 @@ pub(crate) fn patch_bias(
             later: (stays * later) as f32,
         }
     };
-    let sums = surroundings.sums(|index| checked[index].numbers(), CHECK_RADIUS, 1);
+    let sums = neighbourhoods.sums(|index| checked[index].numbers(), CHECK_RADIUS, 1);
     let alone: Vec<Unsmoothed> = texels.par_iter().zip(gathered).zip(sums).map(around).collect();
     // One neighbourhood's checks tell the square of what is unknown by a single sample, which may be as good as nothing: others' tell it too.
     // With one standard error of their mean, as what is to be known is how large it may be.
     let numbers = |index: usize| [1.0, alone[index].unknown, alone[index].unknown.powi(2)];
-    let sums = surroundings.sums(numbers, WIDER_STEPS, WIDER_STEP);
+    let sums = neighbourhoods.sums(numbers, WIDER_STEPS, WIDER_STEP);
     let wider = |(sums, own): ([f32; 3], &Unsmoothed)| {
         let [count, sum, _] = sums;
         let unknown = own.unknown.max(sum / count.max(1.0) + standard_error(sums));

@@ -8,7 +8,7 @@
 //!   noise          spread of four replicates, after smoothing               error_estimate::spread         the neighbours' mean
 //!   smoothing      half of the replicates smoothed against the other raw    smoothing_bias                 as it is
 //!   form factors   half the difference of two half solutions, and to one    exchange and size_error        as it is
-//!                  with patches twice as large, read by the texel's rays    Gathered::patch_error
+//!                  with patches twice as large, read by the texel's rays    GatherSums::patch_error
 //!   texels read    what noise leaves in the texels that later rounds read,  gather                         as it is
 //!                  as far as it is correlated
 //!   patches        patches against real bounces, at some of the hits        error_estimate::patch_bias     without what chance added
@@ -34,12 +34,12 @@ use crate::coverage::footprint::Texel;
 use crate::denoise::replicates::{Estimates, mean};
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
-use crate::final_gather::gathered::Gathered;
+use crate::final_gather::gather_sums::GatherSums;
 use crate::sources::direct::Direct;
 
 /// What the gather leaves.
 pub(crate) struct GatherErrors<'a> {
-    pub gathered: &'a [Gathered],
+    pub gathered: &'a [GatherSums],
     pub estimates: &'a [Estimates],
     /// Variance of the mean of each.
     pub noise: &'a SquaredErrors,
@@ -70,7 +70,7 @@ enum Term {
     TexelsRead,
     Patches,
     Solver,
-    Kept,
+    ReusedGather,
     Arithmetic,
 }
 
@@ -86,7 +86,7 @@ impl Term {
         Self::TexelsRead,
         Self::Patches,
         Self::Solver,
-        Self::Kept,
+        Self::ReusedGather,
         Self::Arithmetic,
     ];
 
@@ -99,7 +99,7 @@ impl Term {
             Self::TexelsRead => "noise of texels that rays read",
             Self::Patches => "patches beside real bounces",
             Self::Solver => "solver",
-            Self::Kept => "light kept of a former bake",
+            Self::ReusedGather => "light kept of a former bake",
             Self::Arithmetic => "arithmetic",
         }
     }
@@ -119,7 +119,7 @@ impl ErrorLedger<'_> {
             let cautious = |term| self.of(term, index);
             let read = cautious(Term::FormFactors) + cautious(Term::TexelsRead);
             let [smoothing, solver, patches, kept] =
-                [Term::Smoothing, Term::Solver, Term::Patches, Term::Kept].map(cautious);
+                [Term::Smoothing, Term::Solver, Term::Patches, Term::ReusedGather].map(cautious);
             let systematic = smoothing + read + solver + patches + kept;
             let rest = cautious(Term::DirectLight) + systematic + cautious(Term::Arithmetic);
             let expected = self.expected(Term::Noise, index) + (rest - self.direct[index].caution);
@@ -177,7 +177,7 @@ impl ErrorLedger<'_> {
                     gather.residual_bound as f32 * mean(&gather.estimates[index]).element_sum() / 3.0;
                 unsolved * unsolved
             }
-            (Term::Kept, Some(gather)) => gather.kept.get(index).map_or(0.0, |kept| kept * kept),
+            (Term::ReusedGather, Some(gather)) => gather.kept.get(index).map_or(0.0, |kept| kept * kept),
         }
     }
 

@@ -3,7 +3,7 @@
 //! patch is too coarse for so near a hit the ray goes on. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `incident`.
 
 use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::gathered::Gathered;
+use crate::final_gather::gather_sums::GatherSums;
 use std::cell::RefCell;
 
 use glam::{Vec2, Vec3};
@@ -39,17 +39,17 @@ struct Batch<Name> {
 struct Batches {
     /// By replicate and number of the sample.
     samples: Batch<(usize, u32)>,
-    readings: [Reading; BATCH],
+    contributions: [GatherContribution; BATCH],
     /// By place of the sample and the patch that it read.
     checks: Batch<(usize, PatchIndex)>,
 }
 
 thread_local! {
-    /// Kept, as to clear them for every texel takes as long as some of its rays. What a batch leaves in them nothing reads.
+    /// ReusedGather, as to clear them for every texel takes as long as some of its rays. What a batch leaves in them nothing reads.
     static BATCHES: RefCell<Batches> = const {
         RefCell::new(Batches {
             samples: Batch::empty((0, 0)),
-            readings: [Reading::NONE; BATCH],
+            contributions: [GatherContribution::NONE; BATCH],
             checks: Batch::empty((0, PatchIndex(0))),
         })
     };
@@ -79,7 +79,7 @@ impl<Name: Copy> Batch<Name> {
 
 /// What one sample of the gather found.
 #[derive(Clone, Copy)]
-struct Reading {
+struct GatherContribution {
     light: Vec3,
     weight: f32,
     /// What the patches' errors leave in it.
@@ -95,7 +95,7 @@ struct Reading {
     rays: u32,
 }
 
-impl Reading {
+impl GatherContribution {
     const NONE: Self = Self {
         light: Vec3::ZERO,
         weight: 0.0,
@@ -110,7 +110,7 @@ impl Reading {
 
 impl RadianceCache<'_> {
     /// Adds samples `self.samples..samples` of every replicate.
-    pub fn gather(&self, texel: &Texel, gathered: &mut Gathered, samples: u32, seed: u32) {
+    pub fn gather(&self, texel: &Texel, gathered: &mut GatherSums, samples: u32, seed: u32) {
         BATCHES.with_borrow_mut(|batches| self.gather_with(batches, texel, gathered, samples, seed));
     }
 
@@ -118,7 +118,7 @@ impl RadianceCache<'_> {
         &self,
         batches: &mut Batches,
         texel: &Texel,
-        gathered: &mut Gathered,
+        gathered: &mut GatherSums,
         samples: u32,
         seed: u32,
     ) {
@@ -149,15 +149,16 @@ impl RadianceCache<'_> {
         &self,
         texel: &Texel,
         sequences: &[TileSequence; REPLICATES],
-        Batches { samples, readings, checks }: &mut Batches,
-        gathered: &mut Gathered,
+        Batches { samples, contributions, checks }: &mut Batches,
+        gathered: &mut GatherSums,
     ) {
         samples.follow(self);
         checks.count = 0;
         let names = &samples.names[..samples.count];
         for (place, (found, &(replicate, sample))) in samples.found.iter().zip(names).enumerate() {
-            let reading = &mut readings[place];
-            *reading = Reading { light: found.light, weight: found.weight, ..Reading::NONE };
+            let reading = &mut contributions[place];
+            *reading =
+                GatherContribution { light: found.light, weight: found.weight, ..GatherContribution::NONE };
             let Some(hit) = &found.hit else { continue };
             gathered.inverse_distances += found.weight / hit.distance.max(f32::MIN_POSITIVE);
             // In turn over replicates, samples and texels, so that every neighbourhood has some at any number of samples.
@@ -177,10 +178,10 @@ impl RadianceCache<'_> {
         for (found, &(place, patch)) in checks.found.iter().zip(&checks.names[..checks.count]) {
             let leaving = |hit: &Hit| found.weight * hit.reflectance * (hit.direct + hit.indirect);
             let real = found.hit.as_ref().map_or(found.light, leaving);
-            readings[place].rays += 1;
-            readings[place].difference *= self.patch_indirect[patch.place()] - real;
+            contributions[place].rays += 1;
+            contributions[place].difference *= self.patch_indirect[patch.place()] - real;
         }
-        for (reading, &(replicate, _)) in readings.iter().zip(names) {
+        for (reading, &(replicate, _)) in contributions.iter().zip(names) {
             gathered.sums[replicate] += reading.light;
             gathered.weights[replicate].add(reading.weight, reading.light);
             gathered.rays += 1 + u64::from(reading.rays);
@@ -202,7 +203,7 @@ impl RadianceCache<'_> {
         hit: &Hit,
         sequence: &TileSequence,
         sample: u32,
-        reading: &mut Reading,
+        reading: &mut GatherContribution,
     ) -> Option<Hit> {
         let mut weight = reading.weight * hit.reflectance;
         let (mut light, mut last) = (weight * hit.direct, *hit);

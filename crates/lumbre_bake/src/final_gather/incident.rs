@@ -94,7 +94,7 @@ impl IncidentSample {
 
 /// Where a sample looks.
 #[derive(Clone, Copy)]
-pub(crate) enum Aim {
+pub(crate) enum SampleTarget {
     /// In a direction about the receiver's normal.
     Around(Vec3),
     /// At a point of a region that the guide named with this probability, as it would be met; and the point just off it.
@@ -105,7 +105,7 @@ pub(crate) enum Aim {
 /// A sample under way.
 #[derive(Clone, Copy)]
 pub(crate) struct SamplePath {
-    aim: Aim,
+    aim: SampleTarget,
     /// Of the samples, what the guide places; none if it knows nothing of the receiver.
     share: Option<f32>,
     /// Part of the guide's row that is asked next.
@@ -120,7 +120,7 @@ pub(crate) struct SamplePath {
 impl SamplePath {
     /// Nothing is known.
     pub const NONE: Self = Self {
-        aim: Aim::Nowhere,
+        aim: SampleTarget::Nowhere,
         share: None,
         part: RowPart::NONE,
         region: None,
@@ -182,7 +182,7 @@ impl RadianceCache<'_> {
                 continue;
             };
             path.region = match path.aim {
-                Aim::At(region, ..) => Some(region),
+                SampleTarget::At(region, ..) => Some(region),
                 _ if path.share.is_some() => self.guide.region_at(hit.triangle, hit.side, hit.at),
                 _ => None,
             };
@@ -209,7 +209,9 @@ impl RadianceCache<'_> {
                     hit.error = self.patch_error[hit.patch.place()];
                 }
             }
-            if let (Aim::Around(_), Some(own), Some(region)) = (&path.aim, request.region, path.region) {
+            if let (SampleTarget::Around(_), Some(own), Some(region)) =
+                (&path.aim, request.region, path.region)
+            {
                 path.part = self.guide.near_region(own, region);
             }
         }
@@ -231,13 +233,15 @@ impl RadianceCache<'_> {
     fn aim(&self, request: &GatherRequest, path: &mut SamplePath) {
         let &GatherRequest { ref receiver, u, v, .. } = request;
         path.aim = match path.share {
-            None => Aim::Around(about(receiver, u, v)),
-            Some(share) if u >= share => Aim::Around(about(receiver, (u - share) / (1.0 - share), v)),
+            None => SampleTarget::Around(about(receiver, u, v)),
+            Some(share) if u >= share => {
+                SampleTarget::Around(about(receiver, (u - share) / (1.0 - share), v))
+            }
             Some(share) => {
                 let picked = self.guide.pick(&path.part, u / share);
                 let point = picked
                     .and_then(|(region, u, probability)| self.point_of(receiver, region, probability, u, v));
-                point.unwrap_or(Aim::Nowhere)
+                point.unwrap_or(SampleTarget::Nowhere)
             }
         };
     }
@@ -248,14 +252,14 @@ impl RadianceCache<'_> {
         *found = IncidentSample::NOTHING;
         let origin = request.receiver.origin;
         match &path.aim {
-            Aim::Nowhere => {}
-            Aim::At(_, _, hit, end) => {
+            SampleTarget::Nowhere => {}
+            SampleTarget::At(_, _, hit, end) => {
                 if !self.scene.blocked(origin, *end) {
                     found.hit = Some(*hit);
                     found.weight = 1.0;
                 }
             }
-            &Aim::Around(direction) => {
+            &SampleTarget::Around(direction) => {
                 // The sky is found by these alone.
                 let rest = 1.0 - path.share.unwrap_or(0.0);
                 match self.scene.first_hit(origin, direction) {
@@ -275,7 +279,7 @@ impl RadianceCache<'_> {
     fn weight(&self, request: &GatherRequest, path: &SamplePath, share: f32, hit: &Hit) -> Option<f32> {
         let region = path.region?;
         let probability = match path.aim {
-            Aim::At(_, probability, ..) => probability,
+            SampleTarget::At(_, probability, ..) => probability,
             _ => self.guide.probability(&path.part, region),
         };
         // Densities over the surfaces' area.
@@ -289,7 +293,14 @@ impl RadianceCache<'_> {
 
     /// A point of a region, if it and the receiver face each other.
     #[inline]
-    fn point_of(&self, receiver: &Receiver, region: Region, probability: f32, u: f32, v: f32) -> Option<Aim> {
+    fn point_of(
+        &self,
+        receiver: &Receiver,
+        region: Region,
+        probability: f32,
+        u: f32,
+        v: f32,
+    ) -> Option<SampleTarget> {
         let Patch { triangle, side, .. } = *self.guide.region(region);
         let at = self.guide.point(region, triangle_point(u, v));
         let surface = &self.scene.triangles[triangle as usize];
@@ -304,7 +315,7 @@ impl RadianceCache<'_> {
         }
         let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
         let hit = Hit { triangle, side, at, direction, distance, ..Hit::UNREAD };
-        Some(Aim::At(region, probability, hit, end))
+        Some(SampleTarget::At(region, probability, hit, end))
     }
 
     /// The receiver at a surface that was met.

@@ -4,10 +4,10 @@
 pub(crate) mod error_estimate;
 pub(crate) mod error_ledger;
 pub(crate) mod gather;
-pub(crate) mod gathered;
+pub(crate) mod gather_sums;
 pub(crate) mod incident;
-pub(crate) mod kept;
-pub(crate) mod late;
+pub(crate) mod patch_fallback;
 pub(crate) mod radiance_cache;
+pub(crate) mod reused_gather;
 pub(crate) mod rounds;
 pub(crate) mod texel_radiance;

@@ -6,7 +6,7 @@ use super::texel_radiance::{GatheredLight, mean_reflectances};
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::denoise::replicates::REPLICATES;
 use crate::direct_light::DirectLight;
-use crate::progress::Watch;
+use crate::monitor::BakeMonitor;
 use crate::radiosity::exchange::Exchange;
 use crate::radiosity::patches::Patches;
 use crate::radiosity::sampling_guide::SamplingGuide;
@@ -35,7 +35,7 @@ pub(crate) struct RadianceCache<'a> {
     pub near: &'a [f32],
     /// What the rounds so far have found of the bounces; nothing in the first.
     pub gathered: GatheredLight,
-    /// Within this distance on a surface the errors of `gathered` are correlated, canonical units.
+    /// Within this distance on a surface the errors of `gather_sums` are correlated, canonical units.
     pub correlated: f32,
     /// Per texel of all maps, mean reflectance, where it is not the same all over the triangle; NaN elsewhere, or empty.
     pub reflectance: Vec<Vec3>,
@@ -60,16 +60,17 @@ impl<'a> RadianceCache<'a> {
         direct: &DirectLight,
         exchange: &'a Exchange,
         options: &BakeOptions,
-        watch: &mut Watch<'_>,
+        monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
         let (scene, effort) = (sources.scene, options.effort());
         let mut direct = direct.by_place(texels);
         // One value of both sides would be read on the wrong one.
-        for texel in &texels.straddling {
+        for texel in &texels.divided {
             direct[texels.list[texel.place()].index.place()] = Vec3::NAN;
         }
-        let reflectance =
-            watch.during(0.0, || mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list))?;
+        let reflectance = monitor.run_interruptible(0.0, || {
+            mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list)
+        })?;
         Ok(Self {
             gathered: GatheredLight::default(),
             correlated: CORRELATED_TEXELS * texels.side,

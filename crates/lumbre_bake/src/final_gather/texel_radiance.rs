@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::coverage::footprint::{Footprint, FootprintPoint, Texel};
-use crate::final_gather::gathered::Gathered;
+use crate::final_gather::gather_sums::GatherSums;
 use crate::radiosity::patches::Patches;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
@@ -33,7 +33,7 @@ impl GatheredLight {
     /// Lists are those of the covered texels; `direct`, per texel of all maps, is NaN where a texel has more than one light.
     pub fn new(
         texels: &[Texel],
-        gathered: &[Gathered],
+        gathered: &[GatherSums],
         light: &[Vec3],
         variances: &[f32],
         direct: &[Vec3],

@@ -18,7 +18,7 @@ const BICUBIC_RINGS: u32 = 4;
 
 /// What is known of a texel of a map.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Known {
+pub(crate) struct TexelValue {
     pub value: Vec3,
     /// Squared error, mean of the channels.
     pub variance: f32,
@@ -31,13 +31,13 @@ pub(crate) struct Known {
 /// the charts; into texels that other geometry hides they go only where a point in the open reads them.
 fn fill_map(
     (width, height): (u32, u32),
-    known: &[Option<Known>],
+    known: &[Option<TexelValue>],
     hidden: &[Hidden],
     rings: u32,
     stop: &CancelToken,
-) -> Vec<Option<Known>> {
+) -> Vec<Option<TexelValue>> {
     // The charts' own texels first, moved to their centres.
-    let mut current: Vec<Option<Known>> = (0..known.len())
+    let mut current: Vec<Option<TexelValue>> = (0..known.len())
         .into_par_iter()
         .map(|index| {
             let own = known[index].filter(|_| !stop.is_cancelled())?;
@@ -49,11 +49,11 @@ fn fill_map(
             let (x, y) = (index as u32 % width, index as u32 / width);
             let (value, variance) =
                 continued(width, height, known, x, y, own.chart, true).unwrap_or((own.value, own.variance));
-            Some(Known { value, variance, middle: Vec2::splat(0.5), ..own })
+            Some(TexelValue { value, variance, middle: Vec2::splat(0.5), ..own })
         })
         .collect();
     for ring in 0..rings.max(2) {
-        let next: Vec<Option<Known>> = (0..current.len())
+        let next: Vec<Option<TexelValue>> = (0..current.len())
             .into_par_iter()
             .map(|index| {
                 let wanted = match hidden[index] {
@@ -67,7 +67,7 @@ fn fill_map(
                 let (x, y) = (index as u32 % width, index as u32 / width);
                 let chart = nearest_chart(width, height, &current, x, y)?;
                 let (value, variance) = continued(width, height, &current, x, y, chart, false)?;
-                Some(Known { value, variance, middle: Vec2::splat(0.5), chart })
+                Some(TexelValue { value, variance, middle: Vec2::splat(0.5), chart })
             })
             .collect();
         current = next;
@@ -88,7 +88,7 @@ enum Hidden {
 }
 
 /// The chart of the nearest of the eight neighbours.
-fn nearest_chart(width: u32, height: u32, known: &[Option<Known>], x: u32, y: u32) -> Option<u32> {
+fn nearest_chart(width: u32, height: u32, known: &[Option<TexelValue>], x: u32, y: u32) -> Option<u32> {
     let mut best: Option<(u32, u32)> = None;
     for (nx, ny) in around(width, height, x, y, 1) {
         if let Some(neighbour) = &known[(ny * width + nx) as usize] {
@@ -107,7 +107,7 @@ fn nearest_chart(width: u32, height: u32, known: &[Option<Known>], x: u32, y: u3
 fn continued(
     width: u32,
     height: u32,
-    known: &[Option<Known>],
+    known: &[Option<TexelValue>],
     x: u32,
     y: u32,
     chart: u32,
@@ -187,11 +187,11 @@ pub(crate) fn fill(
     stop: &CancelToken,
 ) -> (Vec<Vec3>, Vec<f32>) {
     let CoveredTexels { layout, list: texels, charts, .. } = texels;
-    let mut known: Vec<Option<Known>> = vec![None; layout.texels];
+    let mut known: Vec<Option<TexelValue>> = vec![None; layout.texels];
     for (texel, (&value, &variance)) in texels.iter().zip(values.iter().zip(variances)) {
         if !texel.is_hidden() {
             let chart = charts[texel.triangle as usize];
-            known[texel.index.place()] = Some(Known { value, variance, middle: texel.middle(), chart });
+            known[texel.index.place()] = Some(TexelValue { value, variance, middle: texel.middle(), chart });
         }
     }
     let hidden = hidden(layout, texels, if rings >= BICUBIC_RINGS { 2 } else { 1 });
@@ -250,13 +250,13 @@ mod tests {
             for x in 2..6u32 {
                 let middle = if x == 2 { Vec2::new(0.875, 0.5) } else { Vec2::splat(0.5) };
                 let value = plane(x as f32 + middle.x, y as f32 + middle.y);
-                known[(y * 8 + x) as usize] = Some(Known { value, variance: 0.01, middle, chart: 0 });
+                known[(y * 8 + x) as usize] = Some(TexelValue { value, variance: 0.01, middle, chart: 0 });
             }
         }
         let filled = fill_map((8, 8), &known, &[Hidden::No; 64], 1, &CancelToken::default());
         for y in 2..6u32 {
             for x in 1..7u32 {
-                let Known { value: found, variance, .. } = filled[(y * 8 + x) as usize].unwrap();
+                let TexelValue { value: found, variance, .. } = filled[(y * 8 + x) as usize].unwrap();
                 // What stays where it is keeps its error; what is moved or continued has at least that of errors that are all alike.
                 let kept = (3..6).contains(&x);
                 assert!(
@@ -273,14 +273,14 @@ mod tests {
 
     #[test]
     fn charts_do_not_mix() {
-        let known: Vec<Option<Known>> = (0..16)
+        let known: Vec<Option<TexelValue>> = (0..16)
             .map(|index| {
                 let (value, chart) = match index % 4 {
                     0 => (1.0, 0),
                     3 => (9.0, 1),
                     _ => return None,
                 };
-                Some(Known { value: Vec3::splat(value), variance: 0.0, middle: Vec2::splat(0.5), chart })
+                Some(TexelValue { value: Vec3::splat(value), variance: 0.0, middle: Vec2::splat(0.5), chart })
             })
             .collect();
         let filled = fill_map((4, 4), &known, &[Hidden::No; 16], 2, &CancelToken::default());

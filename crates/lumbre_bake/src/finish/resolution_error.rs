@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 use crate::chunks::in_chunks;
 use crate::coverage::footprint::{Footprint, FootprintPoint, Texel, receiver};
 use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::gathered::Gathered;
+use crate::final_gather::gather_sums::GatherSums;
 use crate::final_gather::radiance_cache::RadianceCache;
-use crate::progress::{Stage, Watch};
+use crate::monitor::{BakeMonitor, Stage};
 use crate::report::ResolutionReport;
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
 use crate::scene::Receiver;
@@ -22,7 +22,7 @@ use crate::{BakeError, BakeOptions, BakeReport};
 
 /// Of the rays of a bake, one part in so many; and what takes no time that anyone would notice.
 const SHARE: u64 = 20;
-const LEAST_RAYS: u64 = 1 << 16;
+const MIN_RAYS: u64 = 1 << 16;
 /// Fewest and most points.
 const POINTS: (u64, u64) = (256, 4096);
 /// Shadow rays of a point to each source and gather rays of each replicate; two replicates are a half.
@@ -55,17 +55,17 @@ pub(crate) fn dense_points(
     sources: &Sources<'_>,
     cache: Option<&RadianceCache<'_>>,
     options: &BakeOptions,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<Vec<DensePoint>, BakeError> {
-    if !options.resolution_error || watch.clock().late() {
+    if !options.resolution_error || monitor.clock().is_over() {
         let why = if options.resolution_error { "the time is up" } else { "switched off" };
         report.skipped.push(format!("resolution error: {why}"));
         return Ok(Vec::new());
     }
-    watch.stage(Stage::Resolution, report)?;
+    monitor.stage(Stage::Resolution, report)?;
     let light = Light { scene: sources.scene, sources, cache };
-    let points = light.at_points(report.rays, options, watch)?;
+    let points = light.at_points(report.rays, options, monitor)?;
     report.rays += points.iter().map(|point| point.rays).sum::<u64>();
     Ok(points)
 }
@@ -84,7 +84,7 @@ impl Light<'_> {
         &self,
         rays: u64,
         options: &BakeOptions,
-        watch: &mut Watch<'_>,
+        monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<DensePoint>, BakeError> {
         let mut running = 0.0;
         let ends: Vec<f64> = self
@@ -92,15 +92,15 @@ impl Light<'_> {
             .triangles
             .iter()
             .map(|triangle| {
-                running += if triangle.superseded { 0.0 } else { f64::from(triangle.area) };
+                running += if triangle.is_hidden_duplicate { 0.0 } else { f64::from(triangle.area) };
                 running
             })
             .collect();
         let of_gather = if self.cache.is_some() { GATHER_RAYS * REPLICATES as u32 } else { 0 };
         let cost = u64::from(JUDGES + 2 * SHADOW_RAYS + of_gather);
-        let count = ((rays / SHARE).max(LEAST_RAYS) / cost).clamp(POINTS.0, POINTS.1) as usize;
+        let count = ((rays / SHARE).max(MIN_RAYS) / cost).clamp(POINTS.0, POINTS.1) as usize;
         let sequence = Sequence::new(options.seed, Stream::ResolutionPoints, 0);
-        let points = in_chunks(count, watch, |index| {
+        let points = in_chunks(count, monitor, |index| {
             let [choice, u, v, _] = sequence.point(index as u32, 0);
             let place = f64::from(choice) * running;
             let triangle = ends.partition_point(|&end| end <= place).min(ends.len().saturating_sub(1));
@@ -128,7 +128,7 @@ impl Light<'_> {
         // A texel of one point, in a tile and of an object of its own: so its samples are no texel's.
         let footprint = Footprint::Points(vec![footprint]);
         let texel = Texel { index: MapTexel(index), object: index, x: 0, y: 0, triangle, footprint };
-        let mut gathered = Gathered::default();
+        let mut gathered = GatherSums::default();
         cache.gather(&texel, &mut gathered, GATHER_RAYS, hash(seed ^ Stream::ResolutionPoints.number()));
         let [a, b, c, d] = gathered.sums.map(|sum| sum / GATHER_RAYS as f32);
         point.indirect = [0.5 * (a + b), 0.5 * (c + d)];

@@ -6,7 +6,7 @@ use super::fill::fill;
 use crate::cancel_token::CancelToken;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::direct_light::DirectLight;
-use crate::final_gather::rounds::Bounced;
+use crate::final_gather::rounds::IndirectLight;
 
 /// Irradiance of the texels of all maps in two, W/m²; NaN where nothing is known.
 pub(crate) struct Separate {
@@ -18,7 +18,7 @@ pub(crate) struct Separate {
 /// whole is so done to both in proportion: neither is negative, and they add up to the map.
 pub(crate) fn separate(
     texels: &CoveredTexels<'_>,
-    (direct, bounced): (&DirectLight, &Bounced),
+    (direct, bounced): (&DirectLight, &IndirectLight),
     finished: &[Vec3],
     rings: u32,
     stop: &CancelToken,

@@ -11,9 +11,9 @@ use crate::scene::{BakeScene, SceneObject};
 /// Places are cubes of this share of the level's longest side.
 const PLACE: f32 = 1.0 / 8.0;
 /// Places with fewer of the open texels are not told.
-const LEAST_TEXELS: f64 = 0.01;
-const MOST_PLACES: usize = 3;
-const MOST_OBJECTS: usize = 2;
+const MIN_TEXELS: f64 = 0.01;
+const MAX_PLACES: usize = 3;
+const MAX_OBJECTS: usize = 2;
 
 /// What is found in one place.
 #[derive(Default)]
@@ -56,18 +56,18 @@ pub(crate) fn worst_places(
         let count = f64::from(place.texels);
         let error = (scale * place.squares / count).sqrt();
         let texels = count / f64::from(open);
-        if texels < LEAST_TEXELS || error <= whole {
+        if texels < MIN_TEXELS || error <= whole {
             return None;
         }
         let mut worst: Vec<(u32, f64)> = place.of_objects.into_iter().collect();
         worst.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let name = |&(object, _): &(u32, f64)| objects.get(object as usize).map(|object| object.name.clone());
-        let objects = worst.iter().take(MOST_OBJECTS).filter_map(name).collect();
+        let objects = worst.iter().take(MAX_OBJECTS).filter_map(name).collect();
         let center = scene.space.world((place.position / count).as_vec3()).to_array();
         Some(WorstPlace { center, error, texels, objects })
     };
     let mut worst: Vec<WorstPlace> = places.into_values().filter_map(told).collect();
     worst.sort_by(|a, b| b.error.total_cmp(&a.error));
-    worst.truncate(MOST_PLACES);
+    worst.truncate(MAX_PLACES);
     worst
 }

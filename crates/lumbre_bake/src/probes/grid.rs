@@ -12,7 +12,7 @@ const BUDGET: u64 = 4096;
 const LIMIT: u64 = 1 << 18;
 
 /// Most cells along an axis: the texture has three times as many along z, and 2048 is what every GPU takes.
-const MOST_CELLS: f64 = 682.0;
+const MAX_CELLS: f64 = 682.0;
 
 /// Least thickness of the box, of its longest side: above a floor there is room too.
 const THINNEST: f64 = 1.0 / 16.0;
@@ -33,7 +33,7 @@ impl Grid {
         spacing: Option<f64>,
         warnings: &mut Vec<String>,
     ) -> Self {
-        let solid = scene.triangles.iter().filter(|triangle| !triangle.superseded);
+        let solid = scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate);
         let corners = solid.flat_map(|triangle| triangle.corners).map(|corner| corner.as_dvec3());
         let moving = moving.iter().map(|&point| (point - scene.space.center) * scene.space.scale);
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -51,7 +51,7 @@ impl Grid {
         let asked = spacing.map(|spacing| spacing * scene.space.scale);
         let budget = if asked.is_some() { LIMIT } else { BUDGET };
         // The volume of a cell if all of the budget were used: the least that can be.
-        let least = (size.x * (size.y * size.z) / budget as f64).cbrt().max(size.max_element() / MOST_CELLS);
+        let least = (size.x * (size.y * size.z) / budget as f64).cbrt().max(size.max_element() / MAX_CELLS);
         let mut side = asked.map_or(least, |asked| asked.max(least));
         let mut cells = resolution(size, side);
         while count(cells) > budget {
@@ -60,7 +60,7 @@ impl Grid {
         }
         if let Some(asked) = asked.filter(|asked| *asked < side) {
             warnings.push(format!(
-                "the probe spacing of {:.3} m was raised to {:.3} m: at most {LIMIT} probes are baked, and {MOST_CELLS} along an axis",
+                "the probe spacing of {:.3} m was raised to {:.3} m: at most {LIMIT} probes are baked, and {MAX_CELLS} along an axis",
                 asked / scene.space.scale,
                 side / scene.space.scale
             ));
@@ -96,7 +96,7 @@ impl Grid {
 /// At least one cell per axis, each at most `side` long.
 fn resolution(size: DVec3, side: f64) -> UVec3 {
     // Rounding must not add a cell to a side that is a whole number of them.
-    (size / side * (1.0 - 1e-9)).ceil().clamp(DVec3::ONE, DVec3::splat(MOST_CELLS)).as_uvec3()
+    (size / side * (1.0 - 1e-9)).ceil().clamp(DVec3::ONE, DVec3::splat(MAX_CELLS)).as_uvec3()
 }
 
 fn count(resolution: UVec3) -> u64 {

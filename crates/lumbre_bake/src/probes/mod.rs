@@ -17,9 +17,9 @@ use lumbre_scene::{AmbientCube, IrradianceVolume};
 pub(crate) use light::ProbeSample;
 
 use self::grid::Grid;
-use crate::chunks::in_chunks_anew;
+use crate::chunks::in_chunks_uncheckpointed;
 use crate::final_gather::radiance_cache::RadianceCache;
-use crate::progress::{Stage, Watch};
+use crate::monitor::{BakeMonitor, Stage};
 use crate::scene::{BakeScene, StaticScene};
 use crate::sources::light_sources::Sources;
 use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
@@ -37,7 +37,7 @@ pub(crate) fn bake(
     sources: &Sources<'_>,
     cache: Option<&RadianceCache<'_>>,
     options: &BakeOptions,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<Option<PlacedVolume>, BakeError> {
     if let Err(reason) = input.calls_for_probes(options) {
@@ -57,12 +57,12 @@ pub(crate) fn bake(
             .push("probes: nothing bounces, and no face shines that is not lit in real time".into());
         return Ok(None);
     }
-    watch.stage(Stage::Probes, report)?;
+    monitor.stage(Stage::Probes, report)?;
     let grid = Grid::new(scene, input.moving_points(), options.probe_spacing, &mut report.warnings);
-    let clock = watch.clock();
-    let seen: Vec<ProbeSample> = in_chunks_anew(grid.count(), watch, |index| {
+    let clock = monitor.clock();
+    let seen: Vec<ProbeSample> = in_chunks_uncheckpointed(grid.count(), monitor, |index| {
         // A complete volume, whatever time it takes: roughly, once the time is up.
-        let quality = if clock.late() { Quality::Draft } else { options.quality };
+        let quality = if clock.is_over() { Quality::Draft } else { options.quality };
         let light = light::ProbeLight { scene, emitters: &emitters, cache, effort: effort(quality) };
         light.at(grid.position(index), options.seed, index as u32)
     })?;

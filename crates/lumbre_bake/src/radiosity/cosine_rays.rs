@@ -1,18 +1,18 @@
-//! Counts for form factors by cosine rays: from points spread over each patch, in directions by the cosine, the patch that is met first.
+//! Counts for form factors by cosine rays: from points spread over each patch, in directions by the cosine, the patch that is hit first.
 //! Stratified within each patch. Not what becomes of the counts: that is `form_factors`.
 
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::BakeError;
 use crate::chunks::in_chunks;
-use crate::progress::Watch;
-use crate::radiosity::ray_counts::{Cast, counted};
+use crate::monitor::BakeMonitor;
+use crate::radiosity::ray_counts::{PatchRayCounts, counted};
 use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
 use crate::scene::{BakeScene, SurfaceHit};
 
 /// Least and most rays of a patch. The sequence has 65,536 points.
-const RAYS: (f64, f64) = (LEAST_RAYS as f64, 65_536.0);
-pub(crate) const LEAST_RAYS: u32 = 32;
+const RAYS: (f64, f64) = (MIN_RAYS as f64, 65_536.0);
+pub(crate) const MIN_RAYS: u32 = 32;
 /// Rays of a patch when the time is up.
 const LATE_RAYS: u32 = 16;
 
@@ -25,17 +25,17 @@ pub(crate) fn cast(
     patches: &Patches,
     rays: usize,
     seed: u32,
-    watch: &mut Watch<'_>,
-) -> Result<(Vec<Cast>, u64), BakeError> {
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(Vec<PatchRayCounts>, u64), BakeError> {
     let total: f64 = patches.list.iter().map(|patch| f64::from(patch.area)).sum();
     let counts: Vec<u32> = patches
         .list
         .iter()
         .map(|patch| (rays as f64 * f64::from(patch.area) / total).round().clamp(RAYS.0, RAYS.1) as u32)
         .collect();
-    let clock = watch.clock();
-    let cast = in_chunks(patches.list.len(), watch, |index| {
-        let count = if clock.late() { LATE_RAYS } else { counts[index] };
+    let clock = monitor.clock();
+    let cast = in_chunks(patches.list.len(), monitor, |index| {
+        let count = if clock.is_over() { LATE_RAYS } else { counts[index] };
         of_patch(scene, patches, PatchIndex::new(index), count, seed)
     })?;
     let rays = cast.iter().flat_map(|cast| cast.count).map(u64::from).sum();
@@ -49,13 +49,13 @@ pub(crate) fn of_patch(
     index: PatchIndex,
     count: u32,
     seed: u32,
-) -> Cast {
+) -> PatchRayCounts {
     let patch = &patches.list[index.place()];
     let triangle = &scene.triangles[patch.triangle as usize];
     let normal = triangle.side_normal(patch.side);
     let [p, q, r] = patches.corners(scene, patch);
     let sequence = Sequence::new(seed, Stream::FormFactors, index.0);
-    let mut met = [Vec::with_capacity(count as usize / 2 + 1), Vec::with_capacity(count as usize / 2)];
+    let mut hits = [Vec::with_capacity(count as usize / 2 + 1), Vec::with_capacity(count as usize / 2)];
     let (mut inside, mut missed) = ([0; 2], [0; 2]);
     for ray in 0..count {
         let half = ray as usize % 2;
@@ -65,12 +65,12 @@ pub(crate) fn of_patch(
         let origin = scene.off_surface(patch.triangle, patch.side, position);
         match scene.first_hit(origin, cosine_about(normal, c, d)) {
             SurfaceHit::Lit { triangle, side, at, .. } => {
-                met[half].extend(patches.at(triangle, side, at).filter(|&other| other != index));
+                hits[half].extend(patches.at(triangle, side, at).filter(|&other| other != index));
             }
             SurfaceHit::Inside => inside[half] += 1,
             SurfaceHit::None => missed[half] += 1,
             SurfaceHit::Back => {}
         }
     }
-    Cast { met: met.map(counted), inside, missed, count: [count.div_ceil(2), count / 2] }
+    PatchRayCounts { hits: hits.map(counted), inside, missed, count: [count.div_ceil(2), count / 2] }
 }

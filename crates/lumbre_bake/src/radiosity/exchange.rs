@@ -11,8 +11,8 @@ use super::sampling_guide::SamplingGuide;
 use super::size_error::size_error;
 use super::solution::gather;
 use crate::chunks::in_chunks;
+use crate::monitor::{BakeMonitor, Stage};
 use crate::options::Solver;
-use crate::progress::{Stage, Watch};
 use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, Receiver};
@@ -64,12 +64,12 @@ impl Exchange {
         options: &BakeOptions,
         resolution: Resolution,
         direct_light: impl FnOnce(&Patches) -> Vec<Option<[Vec3; 2]>>,
-        watch: &mut Watch<'_>,
+        monitor: &mut BakeMonitor<'_>,
         report: &mut BakeReport,
     ) -> Result<Option<(Self, FormFactors)>, BakeError> {
         let side = resolution.patch_side;
-        watch.stage(Stage::FormFactors, report)?;
-        let patches = watch.during(0.0, || Patches::new(scene, side))?;
+        monitor.stage(Stage::FormFactors, report)?;
+        let patches = monitor.run_interruptible(0.0, || Patches::new(scene, side))?;
         report.patches = patches.list.len();
         report.warnings.extend(patches.warnings.iter().cloned());
         if patches.list.iter().all(|patch| patch.reflectance == Vec3::ZERO) {
@@ -81,19 +81,19 @@ impl Exchange {
             };
             report.skipped.push(skipped.into());
             let black = || sources.has_sky().then(|| Self::black(scene, patches, side));
-            return watch.during(0.5, black);
+            return monitor.run_interruptible(0.5, black);
         }
         let (method, rays) = (options.form_factors, resolution.form_factor_rays);
-        let (factors, halves) = FormFactors::sample(scene, &patches, method, rays, options.seed, watch)?;
+        let (factors, halves) = FormFactors::sample(scene, &patches, method, rays, options.seed, monitor)?;
         report.rays += factors.rays;
         report.form_factors = factors.columns.len();
         report.energy_lost = factors.energy_lost;
 
-        watch.stage(Stage::Radiosity, report)?;
-        let known = watch.during(0.1, || direct_light(&patches))?;
+        monitor.stage(Stage::Radiosity, report)?;
+        let known = monitor.run_interruptible(0.1, || direct_light(&patches))?;
         let mut direct_halves = [Vec::new(), Vec::new()];
         for (half, of_half) in (0..).zip(&mut direct_halves) {
-            let found: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), watch, |place| {
+            let found: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), monitor, |place| {
                 match known.get(place) {
                     Some(Some(halves)) if factors.open[place] > 0.0 => return (halves[half as usize], 0),
                     _ => {}
@@ -114,30 +114,32 @@ impl Exchange {
                 .push("radiosity and final gather: no light reaches a surface that reflects".into());
             return Ok(None);
         }
-        watch.advance(0.5)?;
+        monitor.advance(0.5)?;
         let sky = |factors: &FormFactors| -> Vec<Vec3> {
             factors.sky.iter().map(|&share| share * sources.sky).collect()
         };
         let sky_halves = halves.each_ref().map(&sky);
         let sky = sky(&factors);
-        let indirect =
-            watch.during(0.5, || solve(options.solver, &factors, &patches.list, &direct, &sky, report))?;
-        let noise = watch.during(0.6, || {
+        let indirect = monitor.run_interruptible(0.5, || {
+            solve(options.solver, &factors, &patches.list, &direct, &sky, report)
+        })?;
+        let noise = monitor.run_interruptible(0.6, || {
             solution_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list)
         })?;
         let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
         let reflectance: Vec<f64> = patches.list.iter().map(|patch| grey(patch.reflectance)).collect();
         let first: Vec<f64> = direct.iter().zip(&sky).map(|(direct, sky)| grey(*direct + *sky)).collect();
         let light = (reflectance.as_slice(), first.as_slice());
-        let of_size = watch.during(0.7, || {
+        let of_size = monitor.run_interruptible(0.7, || {
             size_error(scene, &patches, side, &factors, light, (options.solver, TOLERANCE))
         })?;
         let indirect_error = noise.iter().zip(of_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
         let leaves = |(index, patch): (usize, &Patch)| patch.reflectance * (direct[index] + indirect[index]);
         let exitance: Vec<Vec3> = patches.list.iter().enumerate().map(leaves).collect();
         let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
-        let guide =
-            watch.during(0.8, || SamplingGuide::new(scene, &patches, side, &factors, &radiosity, &sky))?;
+        let guide = monitor.run_interruptible(0.8, || {
+            SamplingGuide::new(scene, &patches, side, &factors, &radiosity, &sky)
+        })?;
         let near = patches.near_distances(scene, side);
         Ok(Some((Self { patches, direct, indirect, indirect_error, near, guide, exitance }, factors)))
     }

@@ -8,8 +8,8 @@ use glam::Vec3;
 
 use super::exchange::{Exchange, Resolution};
 use super::patches::Patches;
+use crate::monitor::BakeMonitor;
 use crate::options::Solver;
-use crate::progress::Watch;
 use crate::scene::from_world;
 use crate::scene::laid_out::laid_out;
 use crate::sources::emitters::emitters;
@@ -42,13 +42,13 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
     let (_, scene) = laid_out(&input.objects, input.space(), &options);
     let sources = Sources::new(&scene, emitters(&scene), input.lights, input.sky);
     let mut carry_on = |_| ControlFlow::Continue(());
-    let mut watch = Watch::new(&mut carry_on, None);
+    let mut monitor = BakeMonitor::new(&mut carry_on, None);
     let mut report = BakeReport::default();
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let resolution = Resolution { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000 };
     let by_rays = |_: &Patches| Vec::new();
     let exchange =
-        Exchange::new(&scene, &sources, &options, resolution, by_rays, &mut watch, &mut report).unwrap();
+        Exchange::new(&scene, &sources, &options, resolution, by_rays, &mut monitor, &mut report).unwrap();
     (exchange.expect("light bounces").0.indirect, report)
 }
 

@@ -9,8 +9,8 @@ use lumbre_mesh::TriangleMesh;
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
+use crate::monitor::{BakeMonitor, Progress};
 use crate::options::FormFactorMethod;
-use crate::progress::{Progress, Watch};
 use crate::scene::laid_out::laid_out;
 use crate::scene::{BakeScene, Canonical, PlacedPrimitive, SceneObject};
 use crate::{BakeOptions, Density};
@@ -50,8 +50,8 @@ fn factor(objects: &[&[[Vec3; 3]]], side: f32, method: FormFactorMethod) -> (f64
     let scene = scene(objects);
     let patches = Patches::new(&scene, side * scene.space.scale as f32);
     let mut carry_on = carry_on;
-    let watch = &mut Watch::new(&mut carry_on, None);
-    let (factors, _) = FormFactors::sample(&scene, &patches, method, 200_000, 7, watch).unwrap();
+    let monitor = &mut BakeMonitor::new(&mut carry_on, None);
+    let (factors, _) = FormFactors::sample(&scene, &patches, method, 200_000, 7, monitor).unwrap();
     let object = |patch: PatchIndex| scene.triangles[patches.list[patch.place()].triangle as usize].object;
     let (mut exchange, mut area) = (0.0, 0.0);
     for i in PatchIndex::all(factors.len()).filter(|&i| object(i) == 0) {
@@ -138,8 +138,8 @@ fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
         let scene = scene(&[&room()]);
         let patches = Patches::new(&scene, 0.25 * scene.space.scale as f32);
         let mut carry_on = carry_on;
-        let watch = &mut Watch::new(&mut carry_on, None);
-        let (factors, _) = FormFactors::sample(&scene, &patches, method, 100_000, 3, watch).unwrap();
+        let monitor = &mut BakeMonitor::new(&mut carry_on, None);
+        let (factors, _) = FormFactors::sample(&scene, &patches, method, 100_000, 3, monitor).unwrap();
         for i in PatchIndex::all(factors.len()) {
             // Twelve rounds of scaling leave what f32 and their own convergence leave.
             assert!((factors.row_sum(i) - 1.0).abs() < 2e-3, "{method:?} row {i:?}: {}", factors.row_sum(i));

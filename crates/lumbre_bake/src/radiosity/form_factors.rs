@@ -2,7 +2,7 @@
 //! G_ij = A_i F_ij = A_j F_ji per pair, so reciprocity is exact. Then rows are scaled to the share of rays that met a surface, which is the exact row sum's own estimate (1 in a closed scene).
 //! Not the counting (`cosine_rays`, `global_lines`), nor the solution of the system they make.
 
-use crate::radiosity::ray_counts::{Cast, Counts, merged};
+use crate::radiosity::ray_counts::{Counts, PatchRayCounts, merged};
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -12,8 +12,8 @@ use super::patches::Patches;
 use super::{cosine_rays, global_lines};
 use crate::BakeError;
 use crate::cancel_token::CancelToken;
+use crate::monitor::BakeMonitor;
 use crate::options::FormFactorMethod;
-use crate::progress::Watch;
 use crate::scene::BakeScene;
 
 /// The symmetric matrix of exchange areas, row by row, sparse.
@@ -50,19 +50,27 @@ impl FormFactors {
         method: FormFactorMethod,
         rays: usize,
         seed: u32,
-        watch: &mut Watch<'_>,
+        monitor: &mut BakeMonitor<'_>,
     ) -> Result<(Self, [Self; 2]), BakeError> {
         let (cast, rays) = match method {
-            FormFactorMethod::CosineRays => cosine_rays::cast(scene, patches, rays, seed, watch)?,
-            FormFactorMethod::GlobalLines => global_lines::cast(scene, patches, rays, seed, watch)?,
+            FormFactorMethod::CosineRays => cosine_rays::cast(scene, patches, rays, seed, monitor)?,
+            FormFactorMethod::GlobalLines => global_lines::cast(scene, patches, rays, seed, monitor)?,
         };
-        watch.during(1.0, || Self::of_counts(scene, patches, &cast, rays))
+        monitor.run_interruptible(1.0, || Self::of_counts(scene, patches, &cast, rays))
     }
 
-    fn of_counts(scene: &BakeScene, patches: &Patches, cast: &[Cast], rays: u64) -> (Self, [Self; 2]) {
-        let [whole, even, odd] =
-            [|cast: &Cast| cast.whole(), |cast: &Cast| cast.half(0), |cast: &Cast| cast.half(1)]
-                .map(|of| cast.par_iter().map(of).collect::<Vec<Counts>>());
+    fn of_counts(
+        scene: &BakeScene,
+        patches: &Patches,
+        cast: &[PatchRayCounts],
+        rays: u64,
+    ) -> (Self, [Self; 2]) {
+        let [whole, even, odd] = [
+            |cast: &PatchRayCounts| cast.whole(),
+            |cast: &PatchRayCounts| cast.half(0),
+            |cast: &PatchRayCounts| cast.half(1),
+        ]
+        .map(|of| cast.par_iter().map(of).collect::<Vec<Counts>>());
         let areas = || patches.list.iter().map(|patch| patch.area).collect();
         let pooled = |counts: &[Counts]| Self::pooled(counts, areas(), &scene.stop);
         let ((even, odd), mut whole) =
@@ -92,8 +100,8 @@ impl FormFactors {
         let row_sums: Vec<f64> = counts
             .iter()
             .map(|own| {
-                let met: f64 = own.met.iter().map(|&(_, n)| f64::from(n)).sum();
-                met / f64::from((own.count - own.inside).max(1))
+                let hits: f64 = own.hits.iter().map(|&(_, n)| f64::from(n)).sum();
+                hits / f64::from((own.count - own.inside).max(1))
             })
             .collect();
         factors.scale_rows(&row_sums);
@@ -185,7 +193,7 @@ fn pool(counts: &[Counts], areas: Vec<f32>, stop: &CancelToken) -> FormFactors {
         }
         let entry =
             |(j, n): (PatchIndex, u32)| (j, (f64::from(n) / (rates[i.place()] + rates[j.place()])) as f32);
-        merged(&counts[i.place()].met, incoming.row(i)).into_iter().map(entry).collect()
+        merged(&counts[i.place()].hits, incoming.row(i)).into_iter().map(entry).collect()
     };
     let mut factors = FormFactors { starts: vec![0], stop: stop.clone(), areas, ..FormFactors::default() };
     // Some rows at a time, so that they are not all there twice.
@@ -204,7 +212,7 @@ fn pool(counts: &[Counts], areas: Vec<f32>, stop: &CancelToken) -> FormFactors {
 /// Rows that are made side by side.
 const ROWS: usize = 4096;
 
-/// The counts by who was met: (who has met it, how often), ascending.
+/// The counts by who was hit: (who has met it, how often), ascending.
 struct Incoming {
     starts: Vec<usize>,
     list: Vec<(PatchIndex, u32)>,
@@ -213,8 +221,8 @@ struct Incoming {
 impl Incoming {
     fn new(counts: &[Counts], stop: &CancelToken) -> Self {
         let mut starts = vec![0usize; counts.len() + 1];
-        for &(met, _) in counts.iter().flat_map(|own| &own.met) {
-            starts[met.place() + 1] += 1;
+        for &(hit, _) in counts.iter().flat_map(|own| &own.hits) {
+            starts[hit.place() + 1] += 1;
         }
         for place in 1..starts.len() {
             starts[place] += starts[place - 1];
@@ -222,9 +230,9 @@ impl Incoming {
         let mut next = starts.clone();
         let mut list = vec![(PatchIndex(0), 0); starts.last().copied().unwrap_or(0)];
         for (i, own) in PatchIndex::all(counts.len()).zip(counts).take_while(|_| !stop.is_cancelled()) {
-            for &(met, n) in &own.met {
-                list[next[met.place()]] = (i, n);
-                next[met.place()] += 1;
+            for &(hit, n) in &own.hits {
+                list[next[hit.place()]] = (i, n);
+                next[hit.place()] += 1;
             }
         }
         Self { starts, list }

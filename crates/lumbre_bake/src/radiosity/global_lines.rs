@@ -9,13 +9,13 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::cosine_rays::{self, LEAST_RAYS};
+use super::cosine_rays::{self, MIN_RAYS};
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::BakeError;
-use crate::chunks::{in_chunks, in_chunks_in_time};
-use crate::progress::Watch;
-use crate::radiosity::ray_counts::{Cast, counted};
+use crate::chunks::{in_chunks, in_chunks_until_deadline};
+use crate::monitor::BakeMonitor;
+use crate::radiosity::ray_counts::{PatchRayCounts, counted};
 use crate::sampling::{Sequence, Stream, cosine_direction, frame, sphere_direction};
 use crate::scene::BakeScene;
 use crate::scene::crossings::Face;
@@ -56,24 +56,25 @@ pub(crate) fn cast(
     patches: &Patches,
     rays: usize,
     seed: u32,
-    watch: &mut Watch<'_>,
-) -> Result<(Vec<Cast>, u64), BakeError> {
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(Vec<PatchRayCounts>, u64), BakeError> {
     let lines = Lines::new(scene, seed);
     let count = (rays as f64 / lines.cost(scene)).ceil();
     let batches = (count / f64::from(BATCH)).ceil() as usize;
-    let parts = in_chunks_in_time(batches, watch, |batch| lines.parts(scene, patches, batch as u32))?;
+    let parts =
+        in_chunks_until_deadline(batches, monitor, |batch| lines.parts(scene, patches, batch as u32))?;
     let lines = parts.len() as u64 * u64::from(BATCH);
     let mut cast = counts_of(&parts, patches.list.len());
-    let few = |cast: &Cast| cast.count.iter().sum::<u32>() < LEAST_RAYS;
+    let few = |cast: &PatchRayCounts| cast.count.iter().sum::<u32>() < MIN_RAYS;
     let seldom: Vec<PatchIndex> =
         PatchIndex::all(cast.len()).filter(|index| few(&cast[index.place()])).collect();
-    let rays = in_chunks(seldom.len(), watch, |place| {
-        cosine_rays::of_patch(scene, patches, seldom[place], LEAST_RAYS, seed)
+    let rays = in_chunks(seldom.len(), monitor, |place| {
+        cosine_rays::of_patch(scene, patches, seldom[place], MIN_RAYS, seed)
     })?;
     for (index, rays) in seldom.iter().zip(&rays) {
         cast[index.place()].add(rays);
     }
-    Ok((cast, lines + rays.len() as u64 * u64::from(LEAST_RAYS)))
+    Ok((cast, lines + rays.len() as u64 * u64::from(MIN_RAYS)))
 }
 
 /// All lines that cross the bounding sphere.
@@ -85,7 +86,7 @@ struct Lines {
 
 impl Lines {
     fn new(scene: &BakeScene, seed: u32) -> Self {
-        let corners = || scene.triangles.iter().filter(|t| !t.superseded).flat_map(|t| t.corners);
+        let corners = || scene.triangles.iter().filter(|t| !t.is_hidden_duplicate).flat_map(|t| t.corners);
         let (low, high) = corners().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), corner| {
             (low.min(corner), high.max(corner))
         });
@@ -98,7 +99,8 @@ impl Lines {
     /// Rays that a line takes the time of: one, and a part for each surface that it crosses, 2A / A_sphere of every area A on average.
     fn cost(&self, scene: &BakeScene) -> f64 {
         const CROSSING: f64 = 0.5;
-        let area: f64 = scene.triangles.iter().filter(|t| !t.superseded).map(|t| f64::from(t.area)).sum();
+        let area: f64 =
+            scene.triangles.iter().filter(|t| !t.is_hidden_duplicate).map(|t| f64::from(t.area)).sum();
         let sphere = 4.0 * std::f64::consts::PI * f64::from(self.radius).powi(2);
         let crossings = if sphere > 0.0 { 2.0 * area / sphere } else { 0.0 };
         LINE + CROSSING * crossings
@@ -142,10 +144,10 @@ impl Lines {
 const LINE: f64 = 1.0;
 
 /// Both ends of each part count it.
-fn counts_of(batches: &[Vec<(LineEnd, LineEnd)>], patches: usize) -> Vec<Cast> {
-    let mut cast = vec![Cast::default(); patches];
+fn counts_of(batches: &[Vec<(LineEnd, LineEnd)>], patches: usize) -> Vec<PatchRayCounts> {
+    let mut cast = vec![PatchRayCounts::default(); patches];
     for half in 0..2 {
-        let mut met: Vec<Vec<PatchIndex>> = vec![Vec::new(); patches];
+        let mut hits: Vec<Vec<PatchIndex>> = vec![Vec::new(); patches];
         for &(a, b) in batches.iter().skip(half).step_by(2).flatten() {
             for (from, to) in [(a, b), (b, a)] {
                 let Some(from) = from.patch() else { continue };
@@ -155,11 +157,11 @@ fn counts_of(batches: &[Vec<(LineEnd, LineEnd)>], patches: usize) -> Vec<Cast> {
                     LineEnd::NOTHING => own.missed[half] += 1,
                     LineEnd::INSIDE => own.inside[half] += 1,
                     // What a patch sees of itself across a rounded edge is nothing.
-                    _ => met[from.place()].extend(to.patch().filter(|&patch| patch != from)),
+                    _ => hits[from.place()].extend(to.patch().filter(|&patch| patch != from)),
                 }
             }
         }
-        met.into_par_iter().map(counted).zip(&mut cast).for_each(|(met, own)| own.met[half] = met);
+        hits.into_par_iter().map(counted).zip(&mut cast).for_each(|(met, own)| own.hits[half] = met);
     }
     cast
 }

@@ -13,8 +13,8 @@ use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use super::solution::gather;
+use crate::monitor::BakeMonitor;
 use crate::options::{FormFactorMethod, Solver};
-use crate::progress::Watch;
 use crate::sampling::{Sequence, Stream};
 use crate::scene::from_world;
 use crate::scene::laid_out::laid_out;
@@ -54,10 +54,10 @@ fn form_factor_errors(
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let patches = Patches::new(&scene, (2.0 * area / options.effort().patches as f32).sqrt());
     let mut carry_on = |_| ControlFlow::Continue(());
-    let mut watch = Watch::new(&mut carry_on, None);
+    let mut monitor = BakeMonitor::new(&mut carry_on, None);
     let mut sample = |method, rays, seed| {
         let begun = Instant::now();
-        let (factors, _) = FormFactors::sample(&scene, &patches, method, rays, seed, &mut watch)?;
+        let (factors, _) = FormFactors::sample(&scene, &patches, method, rays, seed, &mut monitor)?;
         Ok::<_, BakeError>((factors, begun.elapsed().as_secs_f64()))
     };
     let mut references = Vec::new();

@@ -1,9 +1,9 @@
 //! Patches, the form factors between them, and the linear system that says how much light each one sends. Not the light of texels, which
 //! `final_gather` computes from it.
 
+pub(crate) mod bsp;
 pub(crate) mod components;
 pub(crate) mod cosine_rays;
-pub(crate) mod cuts;
 pub(crate) mod exchange;
 #[cfg(test)]
 mod exchange_tests;

@@ -22,7 +22,7 @@ pub(crate) fn patch_light(
     patches: &Patches,
 ) -> Vec<Option<[Vec3; 2]>> {
     let mut divided = vec![false; texels.list.len()];
-    texels.straddling.iter().for_each(|texel| divided[texel.place()] = true);
+    texels.divided.iter().for_each(|texel| divided[texel.place()] = true);
     let mut sums = vec![[(DVec3::ZERO, 0.0f64); 2]; patches.list.len()];
     let told = texels.list.iter().zip(&direct.texels).zip(divided).filter(|(_, divided)| !divided);
     for ((texel, direct), _) in told {
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
     use crate::coverage::footprint::{FootprintPoint, receiver};
     use crate::direct_light::direct_light;
-    use crate::progress::Watch;
+    use crate::monitor::BakeMonitor;
     use crate::sampling::{Sequence, Stream, triangle_point};
     use crate::scene::laid_out::laid_out;
     use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
@@ -103,9 +103,9 @@ mod tests {
         let (layout, scene) = laid_out(&input.objects, input.space(), &options);
         let sources = Sources::new(&scene, Vec::new(), input.lights.clone(), Vec3::ZERO);
         let mut carry_on = |_| ControlFlow::Continue(());
-        let (mut watch, mut report) = (Watch::new(&mut carry_on, None), BakeReport::default());
-        let texels = CoveredTexels::new(&scene, &layout, &mut watch, &mut report).unwrap();
-        let direct = direct_light(&sources, &texels, &[], &options, &mut watch, &mut report).unwrap();
+        let (mut monitor, mut report) = (BakeMonitor::new(&mut carry_on, None), BakeReport::default());
+        let texels = CoveredTexels::new(&scene, &layout, &mut monitor, &mut report).unwrap();
+        let direct = direct_light(&sources, &texels, &[], &options, &mut monitor, &mut report).unwrap();
         let patches = Patches::new(&scene, 6.0 * texels.side);
         let told = patch_light(&scene, &texels, &direct, &patches);
 

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use glam::{DMat2, DVec2, Vec3};
 use rayon::prelude::*;
 
-use super::cuts::{Corners, CutCell, Cuts};
+use super::bsp::{BspTrees, Corners, CutCell};
 use super::patch_index::PatchIndex;
 use crate::scene::mean_of_points::mean_of_points;
 use crate::visibility::contacts::{PlaneFrame, contacts};
@@ -45,7 +45,7 @@ struct Cut {
 }
 
 /// Share of a cell that a piece of it has at least.
-const LEAST_PIECE: f32 = 1e-6;
+const MIN_PIECE: f32 = 1e-6;
 /// Of a cell, or of all of a triangle's: no line goes through.
 const UNCUT: u32 = u32::MAX;
 /// Marks a piece of a cell.
@@ -60,7 +60,7 @@ pub(crate) struct Patches {
     cuts: Vec<Cut>,
     /// Of each cell of each triangle that has some cut: its tree, or [`UNCUT`].
     roots: Vec<u32>,
-    lines: Cuts,
+    lines: BspTrees,
     /// What is coarser than it should be, in words.
     pub warnings: Vec<String>,
 }
@@ -81,8 +81,8 @@ impl Patches {
 
     /// How many [`Patches::new`] would make.
     pub fn count(scene: &BakeScene, side: f32) -> u64 {
-        let mut lines = Cuts::default();
-        let met = scene.triangles.iter().enumerate().filter(|(_, triangle)| !triangle.superseded);
+        let mut lines = BspTrees::default();
+        let met = scene.triangles.iter().enumerate().filter(|(_, triangle)| !triangle.is_hidden_duplicate);
         let met = met.take_while(|_| !scene.stop.is_cancelled());
         met.map(|(index, triangle)| {
             let divisions = divisions(triangle, side);
@@ -93,7 +93,7 @@ impl Patches {
         .sum()
     }
 
-    /// Cuts every triangle into patches of about `side` canonical units.
+    /// BspTrees every triangle into patches of about `side` canonical units.
     pub fn new(scene: &BakeScene, side: f32) -> Self {
         let mut patches = Self::outlines(scene, side);
         let of_patch = |patch: &Patch| {
@@ -130,12 +130,12 @@ impl Patches {
 
     /// The same, of which nobody asks what they reflect.
     pub fn outlines(scene: &BakeScene, side: f32) -> Self {
-        let mut lines = Cuts::default();
+        let mut lines = BspTrees::default();
         let (mut list, mut cuts) = (Vec::new(), Vec::with_capacity(scene.triangles.len()));
         let mut roots = Vec::new();
         let mut full: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, triangle) in scene.triangles.iter().enumerate() {
-            if triangle.superseded || scene.stop.is_cancelled() {
+            if triangle.is_hidden_duplicate || scene.stop.is_cancelled() {
                 cuts.push(Cut {
                     divisions: 0,
                     front: PatchIndex(0),
@@ -167,7 +167,7 @@ impl Patches {
                     let area = match cell & PIECE {
                         0 => triangle.area / cells as f32,
                         // Of a very fine cell's piece the corners may fall together: no patch is without area.
-                        _ => triangle.area * share(&corners).max(LEAST_PIECE / cells as f32),
+                        _ => triangle.area * share(&corners).max(MIN_PIECE / cells as f32),
                     };
                     let (cell, reflectance) = (packed(divisions, cell), Vec3::ZERO);
                     Patch { triangle: index as u32, side, cell, area, reflectance }
@@ -273,13 +273,13 @@ fn divisions(triangle: &SceneTriangle, side: f32) -> u32 {
 /// A cell is cut where it is not much smaller than what `side` asks for.
 const WORTH_CUTTING: f32 = 0.125;
 
-/// Cuts the cells of a triangle along what stands on it; returns which.
+/// BspTrees the cells of a triangle along what stands on it; returns which.
 fn cut_cells(
     scene: &BakeScene,
     index: usize,
     divisions: u32,
     side: f32,
-    lines: &mut Cuts,
+    lines: &mut BspTrees,
 ) -> Vec<(u32, CutCell)> {
     let triangle = &scene.triangles[index];
     let cells = divisions * divisions;
@@ -344,7 +344,7 @@ fn cells_along(divisions: u32, [p, q]: [DVec2; 2], mut visit: impl FnMut(u32)) {
 const CORNERS: Corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
 
 /// Of a cell or a piece of one.
-fn corners_of(lines: &Cuts, divisions: u32, cell: u32) -> Corners {
+fn corners_of(lines: &BspTrees, divisions: u32, cell: u32) -> Corners {
     if cell & PIECE == 0 {
         CORNERS.map(|(u, v)| point_of_cell(divisions, cell, u, v))
     } else {

@@ -6,8 +6,8 @@ use super::patch_index::PatchIndex;
 
 /// Rays of one patch, in two halves: how many met each other patch, began inside other geometry, met nothing.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Cast {
-    pub met: [Vec<(PatchIndex, u32)>; 2],
+pub(crate) struct PatchRayCounts {
+    pub hits: [Vec<(PatchIndex, u32)>; 2],
     pub inside: [u32; 2],
     pub missed: [u32; 2],
     /// How many they were.
@@ -17,7 +17,7 @@ pub(crate) struct Cast {
 /// The same, of one half or of both together.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Counts {
-    pub met: Vec<(PatchIndex, u32)>,
+    pub hits: Vec<(PatchIndex, u32)>,
     pub inside: u32,
     pub missed: u32,
     pub count: u32,
@@ -30,12 +30,12 @@ impl Counts {
     }
 }
 
-impl Cast {
+impl PatchRayCounts {
     /// Both halves together.
     pub fn whole(&self) -> Counts {
-        let [even, odd] = &self.met;
+        let [even, odd] = &self.hits;
         Counts {
-            met: merged(even, odd),
+            hits: merged(even, odd),
             inside: self.inside.iter().sum(),
             missed: self.missed.iter().sum(),
             count: self.count.iter().sum(),
@@ -45,7 +45,7 @@ impl Cast {
     /// One of them.
     pub fn half(&self, half: usize) -> Counts {
         Counts {
-            met: self.met[half].clone(),
+            hits: self.hits[half].clone(),
             inside: self.inside[half],
             missed: self.missed[half],
             count: self.count[half],
@@ -55,7 +55,7 @@ impl Cast {
     /// Adds the rays of another.
     pub fn add(&mut self, other: &Self) {
         for half in 0..2 {
-            self.met[half] = merged(&self.met[half], &other.met[half]);
+            self.hits[half] = merged(&self.hits[half], &other.hits[half]);
             self.inside[half] += other.inside[half];
             self.missed[half] += other.missed[half];
             self.count[half] += other.count[half];
@@ -78,10 +78,10 @@ pub(crate) fn merged(a: &[(PatchIndex, u32)], b: &[(PatchIndex, u32)]) -> Vec<(P
 }
 
 /// How often each patch occurs, in order.
-pub(crate) fn counted(mut met: Vec<PatchIndex>) -> Vec<(PatchIndex, u32)> {
-    met.sort_unstable();
+pub(crate) fn counted(mut hits: Vec<PatchIndex>) -> Vec<(PatchIndex, u32)> {
+    hits.sort_unstable();
     let mut row: Vec<(PatchIndex, u32)> = Vec::new();
-    for patch in met {
+    for patch in hits {
         match row.last_mut() {
             Some((last, n)) if *last == patch => *n += 1,
             _ => row.push((patch, 1)),

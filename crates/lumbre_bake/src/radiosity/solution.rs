@@ -17,7 +17,7 @@ pub(crate) struct Solution {
 }
 
 /// More iterations than any ρ <= 0.999 needs for a residual of 1e-12.
-pub(crate) const MOST_ITERATIONS: u32 = 30_000;
+pub(crate) const MAX_ITERATIONS: u32 = 30_000;
 
 /// Σ_j F_ij x_j of every patch.
 pub(crate) fn gather(factors: &FormFactors, x: &[f64]) -> Vec<f64> {

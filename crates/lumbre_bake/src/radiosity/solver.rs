@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::components::levels;
 use super::form_factors::FormFactors;
-use super::solution::{MOST_ITERATIONS, Solution, exchanged, gather, norm};
+use super::solution::{MAX_ITERATIONS, Solution, exchanged, gather, norm};
 use super::stationary;
 use crate::conjugate_gradients::{self, System};
 use crate::options::Solver;
@@ -112,7 +112,7 @@ impl System for Radiosity<'_> {
     fn goes_on(&self, steps: usize, left: &[f64], energy: f64) -> bool {
         norm(self.factors, left) > self.enough
             && energy > 0.0
-            && steps < MOST_ITERATIONS as usize
+            && steps < MAX_ITERATIONS as usize
             && !self.factors.stop.is_cancelled()
     }
 }

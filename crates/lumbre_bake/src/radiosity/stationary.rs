@@ -3,7 +3,7 @@
 //! They check the default, which is in `solver` and takes fewer steps.
 
 use super::form_factors::FormFactors;
-use super::solution::{MOST_ITERATIONS, Solution, exchanged, gather, norm};
+use super::solution::{MAX_ITERATIONS, Solution, exchanged, gather, norm};
 
 /// B ← E + ρ F B, of all patches at once; until the residual is at most `tolerance` of the emission's `size`.
 pub(crate) fn jacobi(
@@ -45,7 +45,7 @@ fn iterated(
     sweep: impl Fn(&mut [f64]),
 ) -> Solution {
     let mut solution = Solution { radiosity: emission.to_vec(), iterations: 0, residual: f64::INFINITY };
-    while solution.iterations < MOST_ITERATIONS && !factors.stop.is_cancelled() {
+    while solution.iterations < MAX_ITERATIONS && !factors.stop.is_cancelled() {
         let before = solution.radiosity.clone();
         sweep(&mut solution.radiosity);
         solution.iterations += 1;

@@ -8,8 +8,8 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
+use super::direct_light_invalidation::shadowed;
 use super::fingerprints::{fingerprint, first_triangles};
-use super::relit::shadowed;
 use super::samples::{Content, ObjectSamples, Samples, TexelSamples};
 use crate::content_hash::{ContentHash, Hashes};
 use crate::coverage::covered_texels::CoveredTexels;
@@ -20,19 +20,19 @@ use crate::sources::light_sources::Sources;
 use crate::{BakeOptions, BakeReport, RebakeReport};
 
 /// More changed objects than this are as good as a new scene.
-const MOST_CHANGED: usize = 64;
+const MAX_CHANGED: usize = 64;
 /// The density and the middle of a scene may be off by so much of the density and of the scene's size before everything is laid out anew.
 const DENSITY_SLACK: f64 = 0.05;
 const CENTER_SLACK: f64 = 0.25;
 
 /// A former bake whose samples can be used, before the scene is laid out.
-pub(crate) struct Usable<'a> {
+pub(crate) struct ReusableBake<'a> {
     pub former: &'a Content,
     pub space: Canonical,
     pub density: f64,
 }
 
-impl<'a> Usable<'a> {
+impl<'a> ReusableBake<'a> {
     /// What of a former bake can be used; the report says why where nothing can.
     pub fn of(
         samples: Option<&'a Samples>,
@@ -42,7 +42,7 @@ impl<'a> Usable<'a> {
         report: &mut BakeReport,
     ) -> Option<Self> {
         match Self::new(samples?, hashes, &input.objects, input.space(), options) {
-            Ok(usable) => Some(usable),
+            Ok(reusable) => Some(reusable),
             Err(whole) => {
                 report.rebake = Some(RebakeReport { whole, ..RebakeReport::default() });
                 None
@@ -73,7 +73,7 @@ impl<'a> Usable<'a> {
         }
         let here = missing(&hashes.objects, former.objects.iter().map(|object| &object.hash));
         let gone = missing(former.objects.iter().map(|object| &object.hash), &hashes.objects);
-        if here.max(gone) > MOST_CHANGED {
+        if here.max(gone) > MAX_CHANGED {
             return Err(format!("{} objects have changed or moved", here.max(gone)));
         }
         let density = density_of(objects, former.space, options);
@@ -133,13 +133,13 @@ pub(crate) struct Changes<'a> {
 impl<'a> Changes<'a> {
     /// Finds them.
     pub fn find(
-        usable: &Usable<'a>,
+        reusable: &ReusableBake<'a>,
         hashes: &Hashes,
         objects: &[SceneObject],
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
     ) -> Self {
-        let (scene, former) = (sources.scene, usable.former);
+        let (scene, former) = (sources.scene, reusable.former);
         let CoveredTexels { layout, list: texels, charts, .. } = texels;
         let mut by_hash: HashMap<ContentHash, Vec<&'a ObjectSamples>> = HashMap::new();
         // Of several that are the same, the first is taken first.

@@ -1,4 +1,4 @@
-//! Samples of a change between bounds, put together, and the cones that they are aimed by. Not what is sampled: that is `change`.
+//! Samples of a change between bounds, put together, and the cones that they are aimed by. Not what is sampled: that is `indirect_change`.
 
 use std::f32::consts::TAU;
 

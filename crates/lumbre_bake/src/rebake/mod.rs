@@ -7,27 +7,27 @@
 //!                                   ├─► relit:  texels whose ways to a lamp lead through such a box: direct light anew
 //!                                   │
 //!                                   └─► change: a linear estimate of how the light by bounces changes, patches first, then texels
-//!                                          └─► choice: texels where that, with what was neglected before, is small beside the error asked for
+//!                                          └─► choice: texels where that, with what was reuse_error before, is small beside the error asked for
 //! ```
 //!
 //! Light is linear: the change of the light by bounces obeys the radiosity equation of the new scene, with the change that is seen at first hand as
-//! its source (what the boxes hide or show, and what direct light has changed). That is solved on the patches, so that it brings no noise where nothing changes. What is neglected is added to the stated error.
+//! its source (what the boxes hide or show, and what direct light has changed). That is solved on the patches, so that it brings no noise where nothing changes. What is reuse_error is added to the stated error.
 
-mod change;
 mod changed_box;
 mod changes;
 mod choice;
+mod direct_light_invalidation;
 mod estimate;
 mod fingerprints;
-mod relit;
+mod indirect_change;
 mod report;
 mod samples;
 mod samples_file;
 mod settled;
 
-pub(crate) use change::kept_bounces;
-pub(crate) use changes::{Changes, Usable};
+pub(crate) use changes::{Changes, ReusableBake};
+pub(crate) use indirect_change::kept_bounces;
 pub(crate) use report::rebake_report;
 pub use samples::Samples;
-pub(crate) use samples::{Found, TexelSamples};
+pub(crate) use samples::{SampleCollector, TexelSamples};
 pub use samples_file::SamplesError;

@@ -9,7 +9,7 @@ use super::fingerprints::{bounds, emission, layouts};
 use super::settled;
 use crate::content_hash::{ContentHash, Hashes};
 use crate::coverage::footprint::Texel;
-use crate::final_gather::gathered::{Gathered, Weights};
+use crate::final_gather::gather_sums::{GatherSums, Weights};
 use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject};
 use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
@@ -62,18 +62,18 @@ pub(crate) struct TexelSamples {
     pub footprint: u32,
     pub direct: Direct,
     #[serde(with = "settled")]
-    pub gathered: Gathered,
+    pub gathered: GatherSums,
     /// Irradiance by bounces that the map showed, W/m².
     pub bounced: Vec3,
     /// By how much that may have changed since it was gathered, W/m².
-    pub neglected: f32,
+    pub reuse_error: f32,
 }
 
 impl TexelSamples {
     /// Whether all of it are numbers that a bake can go on with.
     pub fn is_sound(&self) -> bool {
-        let Self { cell: _, footprint: _, direct, gathered, bounced, neglected } = self;
-        let Gathered {
+        let Self { cell: _, footprint: _, direct, gathered, bounced, reuse_error } = self;
+        let GatherSums {
             sums,
             patch_errors,
             texel_variances,
@@ -92,8 +92,8 @@ impl TexelSamples {
             && direct.caution <= direct.variance
             && *texel_variances >= 0.0
             && direct.variance >= 0.0
-            && *neglected >= 0.0
-            && neglected.is_finite()
+            && *reuse_error >= 0.0
+            && reuse_error.is_finite()
     }
 }
 
@@ -109,7 +109,7 @@ impl Samples {
     }
 }
 
-impl Gathered {
+impl GatherSums {
     /// As if every sample had weighed the same: the estimates stay what they are, and what is gathered later adds to them.
     pub fn settled(&self) -> Self {
         let count = self.samples as f32;
@@ -127,18 +127,18 @@ impl Weights {
     }
 }
 
-/// What a bake has found, sorted by object. `neglected` is empty where nothing was kept.
-pub(crate) struct Found<'a> {
+/// What a bake has found, sorted by object. `reuse_error` is empty where nothing was kept.
+pub(crate) struct SampleCollector<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
     pub texels: &'a [Texel],
     pub direct: &'a [Direct],
-    pub gathered: &'a [Gathered],
+    pub gathered: &'a [GatherSums],
     pub bounced: &'a [Vec3],
-    pub neglected: &'a [f32],
+    pub reuse_error: &'a [f32],
 }
 
-impl Found<'_> {
+impl SampleCollector<'_> {
     /// The samples of the whole. `exitance` is the least and most of each object, or empty.
     pub fn samples(
         &self,
@@ -183,9 +183,9 @@ impl Found<'_> {
                 cell: texel.y * self.layout.maps[object].width + texel.x,
                 footprint: fingerprint(texel, first[object]),
                 direct: self.direct[index],
-                gathered: self.gathered.get(index).map_or_else(Gathered::default, Gathered::settled),
+                gathered: self.gathered.get(index).map_or_else(GatherSums::default, GatherSums::settled),
                 bounced: self.bounced.get(index).copied().unwrap_or_default(),
-                neglected: self.neglected.get(index).copied().unwrap_or_default(),
+                reuse_error: self.reuse_error.get(index).copied().unwrap_or_default(),
             };
             // What overflows is not worth keeping.
             if own.is_sound() {
@@ -209,18 +209,18 @@ mod tests {
             products: light(s) * 1.3,
             light_squares: 2.0,
         };
-        let gathered = Gathered {
+        let gathered = GatherSums {
             sums: std::array::from_fn(light),
             weights: std::array::from_fn(weigh),
             samples: 4,
             rays: 99,
-            ..Gathered::default()
+            ..GatherSums::default()
         };
         let settled = gathered.settled();
         for (a, b) in gathered.estimates().iter().zip(settled.estimates()) {
             assert!((*a - b).length() <= 1e-6 * a.length(), "{a} {b}");
         }
         assert_eq!(settled.rays, 0);
-        assert!(Gathered::default().settled().estimates().iter().all(|e| *e == Vec3::ZERO));
+        assert!(GatherSums::default().settled().estimates().iter().all(|e| *e == Vec3::ZERO));
     }
 }

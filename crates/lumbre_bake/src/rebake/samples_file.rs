@@ -15,7 +15,7 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 
 use super::samples::{Content, Samples, TexelSamples};
-use crate::checkpoint::{record, tape};
+use crate::checkpoint::{checkpoint_file, record};
 use crate::scene::Canonical;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
@@ -86,7 +86,7 @@ impl Samples {
     /// [`SamplesError::Io`]; what was there is then as it was.
     pub fn write(&self, path: &Path) -> Result<(), SamplesError> {
         let content = packed(&record::written(&self.0).map_err(io::Error::other)?)?;
-        let beside = tape::temporary(path);
+        let beside = checkpoint_file::temporary(path);
         let written = (|| {
             let mut file = loop {
                 // Not truncated before it is ours: another process may be writing it.
@@ -107,7 +107,7 @@ impl Samples {
         })();
         if written.is_err() {
             // Half-written; if it cannot be removed either, the first error is the one to tell.
-            let _ = tape::remove_if_there(&beside);
+            let _ = checkpoint_file::remove_if_there(&beside);
         }
         Ok(written?)
     }

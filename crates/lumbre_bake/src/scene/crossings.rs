@@ -28,9 +28,9 @@ pub(crate) enum Face {
 /// A place where a line crosses surfaces: one, or several that lie in the same place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Crossing {
-    /// Seen from before, in the line's direction.
+    /// VisibilitySummary from before, in the line's direction.
     pub before: Face,
-    /// Seen from beyond, against the line's direction.
+    /// VisibilitySummary from beyond, against the line's direction.
     pub beyond: Face,
 }
 

@@ -6,9 +6,9 @@ use std::collections::HashMap;
 use glam::Vec3;
 
 /// For each triangle, whether another in the same place takes its light. `emits` says which of them shine.
-pub(crate) fn superseded(triangles: &[[Vec3; 3]], emits: &[bool]) -> Vec<bool> {
+pub(crate) fn is_hidden_duplicate(triangles: &[[Vec3; 3]], emits: &[bool]) -> Vec<bool> {
     let mut first: HashMap<[[u32; 3]; 3], usize> = HashMap::with_capacity(triangles.len());
-    let mut superseded = vec![false; triangles.len()];
+    let mut is_hidden_duplicate = vec![false; triangles.len()];
     for (index, triangle) in triangles.iter().enumerate() {
         let keys = triangle.map(|position| (position + Vec3::ZERO).to_array().map(f32::to_bits));
         // Rotated so that the smallest comes first: the winding stays.
@@ -19,13 +19,13 @@ pub(crate) fn superseded(triangles: &[[Vec3; 3]], emits: &[bool]) -> Vec<bool> {
                 first.insert(key, index);
             }
             Some(earlier) if emits[index] && !emits[earlier] => {
-                superseded[earlier] = true;
+                is_hidden_duplicate[earlier] = true;
                 first.insert(key, index);
             }
-            Some(_) => superseded[index] = true,
+            Some(_) => is_hidden_duplicate[index] = true,
         }
     }
-    superseded
+    is_hidden_duplicate
 }
 
 #[cfg(test)]
@@ -37,7 +37,7 @@ mod tests {
         let t = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let rotated = [Vec3::X, Vec3::Y, Vec3::ZERO];
         let back = [Vec3::X, Vec3::ZERO, Vec3::Y];
-        assert_eq!(superseded(&[t, rotated, back], &[false; 3]), [false, true, false]);
-        assert_eq!(superseded(&[t, rotated, back], &[false, true, false]), [true, false, false]);
+        assert_eq!(is_hidden_duplicate(&[t, rotated, back], &[false; 3]), [false, true, false]);
+        assert_eq!(is_hidden_duplicate(&[t, rotated, back], &[false, true, false]), [true, false, false]);
     }
 }

@@ -61,12 +61,15 @@ const AUTOMATIC_TEXELS: f64 = 500_000.0;
 /// Largest side of a map.
 const LARGEST_SIDE: u32 = 8192;
 /// Most texels of all maps: 4 GiB of working memory at some 64 bytes each.
-const MOST_TEXELS: u64 = 1 << 26;
+const MAX_TEXELS: u64 = 1 << 26;
 
 /// Texels per canonical unit of objects whose lightmap scale is 1: exact under a scale of 2^k, unlike metres; 1 where maps have a size instead.
 pub(crate) fn density_of(objects: &[SceneObject], space: Canonical, options: &BakeOptions) -> f64 {
     let area = || -> f64 {
-        objects.iter().map(|object| Placed::new(object, space).area * object.lightmap_scale.powi(2)).sum()
+        objects
+            .iter()
+            .map(|object| ObjectGeometry::new(object, space).area * object.lightmap_scale.powi(2))
+            .sum()
     };
     match options.density {
         Density::Automatic => {
@@ -88,7 +91,7 @@ pub(crate) fn lay_out(
     warnings: &mut Vec<String>,
 ) -> Result<LightmapLayout, BakeError> {
     let mut layout = LightmapLayout { density, ..LightmapLayout::default() };
-    let mut instances: HashMap<Vec<u64>, Made> = HashMap::new();
+    let mut instances: HashMap<Vec<u64>, ObjectLayout> = HashMap::new();
     let mut texels = 0u64;
     for object in objects {
         let key = instance_key(object, space);
@@ -100,10 +103,10 @@ pub(crate) fn lay_out(
                 made
             }
         };
-        let Made { meshes, moved, width, height } = made;
+        let ObjectLayout { meshes, moved, width, height } = made;
         texels += u64::from(width) * u64::from(height);
-        if texels > MOST_TEXELS {
-            return Err(BakeError::TooManyTexels { texels, limit: MOST_TEXELS });
+        if texels > MAX_TEXELS {
+            return Err(BakeError::TooManyTexels { texels, limit: MAX_TEXELS });
         }
         layout.maps.push(MapLayout { meshes, moved, width, height, first: layout.texels });
         layout.texels = texels as usize;
@@ -140,14 +143,14 @@ fn instance_key(object: &SceneObject, space: Canonical) -> Vec<u64> {
 }
 
 /// All triangles of an object in canonical space.
-struct Placed {
+struct ObjectGeometry {
     mesh: TriangleMesh,
     area: f64,
     /// Area in the unit square of `uv1`, if every part has it.
     uv_area: Option<f64>,
 }
 
-impl Placed {
+impl ObjectGeometry {
     fn new(object: &SceneObject, space: Canonical) -> Self {
         let mut mesh = TriangleMesh::default();
         let has_uv =
@@ -178,7 +181,7 @@ impl Placed {
 
 /// What objects share that are laid out alike.
 #[derive(Clone)]
-struct Made {
+struct ObjectLayout {
     meshes: Vec<Arc<TriangleMesh>>,
     moved: Vec<bool>,
     width: u32,
@@ -192,8 +195,8 @@ fn lay_out_object(
     options: &BakeOptions,
     stop: &CancelToken,
     warnings: &mut Vec<String>,
-) -> Result<Made, BakeError> {
-    let placed = Placed::new(object, space);
+) -> Result<ObjectLayout, BakeError> {
+    let placed = ObjectGeometry::new(object, space);
     let density = density * object.lightmap_scale;
     let side_of_map = |side: u32| {
         (f64::from(side) * object.lightmap_scale).round().clamp(4.0, f64::from(LARGEST_SIDE)) as u32
@@ -206,7 +209,7 @@ fn lay_out_object(
         match validate_uv1(&placed.mesh, side, side) {
             Ok(report) if report.is_sound() => {
                 let meshes = object.primitives.iter().map(|part| Arc::clone(&part.mesh)).collect();
-                return Ok(Made { meshes, moved: vec![false; object.primitives.len()], width: side, height: side });
+                return Ok(ObjectLayout { meshes, moved: vec![false; object.primitives.len()], width: side, height: side });
             }
             Ok(report) => warnings.push(format!(
                 "{}: its TEXCOORD_1 cannot hold a lightmap at {side} x {side} texels ({} triangles out of range, {} \
@@ -258,13 +261,13 @@ fn lay_out_object(
     };
     // From the rectangle of the charts to the map it lies in.
     let shrink = Vec2::new(unwrapped.width as f32 / width as f32, unwrapped.height as f32 / height as f32);
-    Ok(Made { meshes: split(&object, &unwrapped, shrink), moved, width, height })
+    Ok(ObjectLayout { meshes: split(&object, &unwrapped, shrink), moved, width, height })
 }
 
 /// The densest unwrap that fits a square of `side` texels, or the next larger one by a power of two in which its charts have room; and its side.
 fn fit(
     object: &SceneObject,
-    placed: &Placed,
+    placed: &ObjectGeometry,
     charted: &Charted<'_>,
     asked: u32,
     gap: u32,
@@ -288,7 +291,7 @@ fn fit(
     // No packing exceeds one texel per texel.
     let mut high = if placed.area > 0.0 { f64::from(side) / placed.area.sqrt() } else { 1.0 };
     let mut low = high;
-    for _ in 0..MOST_DENSITIES {
+    for _ in 0..MAX_DENSITIES {
         match charted.unwrap(low, gap, side) {
             Ok(made) => {
                 best = made;
@@ -317,7 +320,7 @@ fn unwrap_at_most(
     warnings: &mut Vec<String>,
 ) -> Result<Unwrapped, BakeError> {
     let mut tried = density;
-    for _ in 0..MOST_DENSITIES {
+    for _ in 0..MAX_DENSITIES {
         match charted.unwrap(tried, gap, LARGEST_SIDE) {
             Ok(made) => {
                 if tried < density {
@@ -340,7 +343,7 @@ fn unwrap_at_most(
 /// Texels per canonical unit at which every chart has the fewest texels.
 const SPARSEST: f64 = 1e-9;
 /// Densities that are tried, each 0.7 of the one before: down to a millionth.
-const MOST_DENSITIES: u32 = 40;
+const MAX_DENSITIES: u32 = 40;
 
 /// Gives the parts their shares of the unwrapped whole.
 fn split(object: &SceneObject, unwrapped: &Unwrapped, shrink: Vec2) -> Vec<Arc<TriangleMesh>> {

@@ -31,7 +31,7 @@ pub(crate) enum SurfaceHit {
 /// Two hits nearer to each other than this share of their distance and coordinates are in one place.
 pub(super) const SAME_PLACE: f32 = 64.0 / (1 << 24) as f32;
 
-/// Where a segment ends. A target is off its surface by the rounding of its own coordinates. Seen from afar, in a scene much larger than
+/// Where a segment ends. A target is off its surface by the rounding of its own coordinates. VisibilitySummary from afar, in a scene much larger than
 /// they are, the surface is met by as many roundings of the distance before it or behind it: those are taken off the end.
 const FAR_END: f32 = 1.0 - 16.0 / (1 << 24) as f32;
 

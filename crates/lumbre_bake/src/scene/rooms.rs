@@ -26,7 +26,7 @@ impl Room {
                 Some((normal, normal.dot(a)))
             };
             room.sides = triangles.iter().filter_map(side).collect();
-            if !triangles.iter().flatten().all(|&corner| room.surely_holds(corner)) {
+            if !triangles.iter().flatten().all(|&corner| room.contains(corner)) {
                 room.sides.clear();
             }
         }
@@ -38,7 +38,7 @@ impl Room {
     }
 
     /// Whether a point is inside of it, or on its sides; `false` where that is not known.
-    pub fn surely_holds(&self, point: Vec3) -> bool {
+    pub fn contains(&self, point: Vec3) -> bool {
         let (place, slack) = (point.as_dvec3(), f64::from(self.slack()));
         !self.sides.is_empty()
             && self.sides.iter().all(|(normal, height)| normal.dot(place) >= height - slack)
@@ -132,10 +132,10 @@ mod tests {
         let convex: Vec<[Vec3; 3]> = block.iter().map(|&[a, b, c]| [a, c, b].map(|p| turn * p)).collect();
         let room = &found(&convex)[0];
         let inside = [Vec3::ZERO, Vec3::splat(1.9), Vec3::new(2.0, 0.0, 0.3)].map(|point| turn * point);
-        assert!(inside.into_iter().all(|point| room.surely_holds(point)));
+        assert!(inside.into_iter().all(|point| room.contains(point)));
         // In its box, and outside of it.
         let beside = Vec3::new(2.5, 0.0, 2.5);
-        assert!(room.spans(&[beside; 3]) && !room.surely_holds(beside));
+        assert!(room.spans(&[beside; 3]) && !room.contains(beside));
         // One corner pushed in.
         let dented: Vec<[Vec3; 3]> = convex
             .iter()
@@ -144,7 +144,7 @@ mod tests {
             })
             .collect();
         let dented = &found(&dented)[0];
-        assert!(!dented.surely_holds(Vec3::ZERO));
+        assert!(!dented.contains(Vec3::ZERO));
         assert!(room.is_within(room.low, room.high) && !room.is_within(room.low * 0.9, room.high));
     }
 }

@@ -6,7 +6,7 @@ use lumbre_rays::{Bvh, triangle_extent};
 use serde::{Deserialize, Serialize};
 
 use super::box_tree::BoxTree;
-use super::duplicates::superseded;
+use super::duplicates::is_hidden_duplicate;
 use super::hidden_side::closed_pieces;
 use super::leaks::Leaks;
 use super::material::{LARGEST_REFLECTANCE, Side};
@@ -88,7 +88,7 @@ pub(crate) struct SceneTriangle {
     /// The closed piece, if it looks outward: what is inside sees nothing, whatever lies against it from outside.
     pub solid: Option<u32>,
     /// Another triangle in the same place meets the light.
-    pub superseded: bool,
+    pub is_hidden_duplicate: bool,
 }
 
 impl SceneTriangle {
@@ -147,7 +147,7 @@ pub(crate) struct BakeScene {
 }
 
 /// Most triangles: patches and texels name them by 32 bits, the hierarchy by 29.
-const MOST_TRIANGLES: usize = 1 << 28;
+const MAX_TRIANGLES: usize = 1 << 28;
 
 impl BakeScene {
     /// Extracts the triangles; odd ones are named in `warnings`.
@@ -159,8 +159,8 @@ impl BakeScene {
         warnings: &mut Vec<String>,
     ) -> Result<Self, BakeError> {
         let count = objects.iter().flat_map(|o| &o.primitives).map(|part| part.mesh.triangle_count()).sum();
-        if count > MOST_TRIANGLES {
-            return Err(BakeError::TooManyTriangles { triangles: count, limit: MOST_TRIANGLES });
+        if count > MAX_TRIANGLES {
+            return Err(BakeError::TooManyTriangles { triangles: count, limit: MAX_TRIANGLES });
         }
         let (mut triangles, mut surfaces) = (Vec::with_capacity(count), Vec::new());
         let (mut rooms, mut solids) = (Vec::new(), Vec::new());
@@ -174,7 +174,7 @@ impl BakeScene {
         let solid: Vec<[Vec3; 3]> = triangles
             .iter()
             // Both trees leave out what is not a number, and keep the indices.
-            .map(|t| if t.superseded { [Vec3::NAN; 3] } else { t.corners })
+            .map(|t| if t.is_hidden_duplicate { [Vec3::NAN; 3] } else { t.corners })
             .collect();
         let masked = surfaces.iter().any(SurfaceMaterial::is_masked);
         let closed_scene = all_within(&rooms, triangles.iter().map(|triangle| triangle.corners));
@@ -271,7 +271,7 @@ fn extract(
                 two_sided: part.material.double_sided,
                 closed: false,
                 solid: None,
-                superseded: false,
+                is_hidden_duplicate: false,
             });
         }
     }
@@ -317,7 +317,7 @@ fn mark_closed(
 }
 
 /// Pairs of rooms and solids that are looked at: with more, none counts as solid.
-const MOST_PAIRS: usize = 1 << 24;
+const MAX_PAIRS: usize = 1 << 24;
 
 /// What has a room inside of it, as a house's outside has, is no solid.
 fn without_hollow(
@@ -326,7 +326,7 @@ fn without_hollow(
     solids: &[Solid],
     warnings: &mut Vec<String>,
 ) {
-    let all = rooms.len().saturating_mul(solids.len()) > MOST_PAIRS;
+    let all = rooms.len().saturating_mul(solids.len()) > MAX_PAIRS;
     if all {
         warnings.push(format!(
             "{} rooms and {} closed pieces are too many to tell which are in which; what a piece stands on may be lit inside of it",
@@ -366,9 +366,9 @@ fn mark_superseded(
         .map(|t| surfaces[t.surface as usize].emission(Side::Front, t.vertices, third) != Vec3::ZERO)
         .collect();
     let mut count = 0;
-    for (triangle, superseded) in triangles.iter_mut().zip(superseded(&corners, &emits)) {
-        triangle.superseded = superseded;
-        count += usize::from(superseded);
+    for (triangle, is_hidden_duplicate) in triangles.iter_mut().zip(is_hidden_duplicate(&corners, &emits)) {
+        triangle.is_hidden_duplicate = is_hidden_duplicate;
+        count += usize::from(is_hidden_duplicate);
     }
     if count > 0 {
         warnings.push(format!(

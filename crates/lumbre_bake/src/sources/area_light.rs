@@ -7,7 +7,7 @@ use super::batches::{BATCHES, batch_of};
 use super::direct::Direct;
 use super::emitter_sample::{EmitterSample, sample_emitter};
 use super::emitter_tree::{EXACT_EMITTERS, TERM_ERROR};
-use super::emitter_walk::Chosen;
+use super::emitter_walk::EmitterChoice;
 use super::emitters::Emitter;
 use super::light_sources::Sources;
 use super::receiver_quadrature::ReceiverQuadrature;
@@ -15,7 +15,7 @@ use super::share_variance::{share_variance, uneven_variance};
 use crate::sampling::Sequence;
 use crate::scene::Receiver;
 use crate::visibility::cut_out::Pieces;
-use crate::visibility::occluders::{PartOccluders, Visibility};
+use crate::visibility::occluders::{LampOccluders, Visibility};
 use crate::visibility::visible_part::visible_part;
 
 /// The part of a source that is seen, per channel, and its variance.
@@ -35,18 +35,18 @@ const RAYS_OF_A_POINT: u32 = 8;
 /// The dimension sets of lamps begin here: before it are the punctual lights'.
 const FIRST_SET: u32 = 34;
 
-/// Of `samples` for the brightest source, those of one that brings `part` of it: a power of two, as batches are best spread.
-pub(crate) fn allotted(samples: u32, part: f32) -> u32 {
+/// Of `samples` for the brightest source, those of one that brings a `fraction` of it: a power of two, as batches are best spread.
+fn samples_for(samples: u32, fraction: f32) -> u32 {
     let least = (samples / 4).max(BATCHES as u32).min(samples);
-    ((samples as f32 * part) as u32).next_power_of_two().clamp(least, samples)
+    ((samples as f32 * fraction) as u32).next_power_of_two().clamp(least, samples)
 }
 
 impl Sources<'_> {
     /// E = Σ (mean of the exact unoccluded light) x (seen light / all light, by the same samples) over lamps: exact in
     /// full light and in full shadow of each, and in between its error is that of the share alone.
-    pub(crate) fn emitted(
+    pub(crate) fn area_light_irradiance(
         &self,
-        parts: &[u32],
+        nodes: &[u32],
         visibility: &Visibility<'_>,
         sequence: Sequence,
         samples: u32,
@@ -55,40 +55,40 @@ impl Sources<'_> {
     ) -> Vec3 {
         let Some(anchor) = point(0.5, 0.5) else { return Vec3::ZERO };
         let weights: Vec<f32> =
-            parts.iter().map(|&part| self.emitter_tree.weight(part, &anchor, 0.0)).collect();
+            nodes.iter().map(|&node| self.emitter_tree.weight(node, &anchor, 0.0)).collect();
         let brightest = weights.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         let grey = |light: Vec3| light.element_sum() / 3.0;
         let mut irradiance = Vec3::ZERO;
-        for (place, (&part, weight)) in parts.iter().zip(weights).enumerate() {
-            let own = allotted(samples, weight / brightest);
+        for (place, (&node, weight)) in nodes.iter().zip(weights).enumerate() {
+            let own = samples_for(samples, weight / brightest);
             let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
             let unoccluded = || {
                 ReceiverQuadrature::mean(|x, y| {
-                    point(x, y).map(|receiver| self.emitter_tree.unoccluded(&self.emitters, part, &receiver))
+                    point(x, y).map(|receiver| self.emitter_tree.unoccluded(&self.emitters, node, &receiver))
                 })
             };
             let known =
-                visibility.parts.iter().find(|occluders| occluders.part == part).and_then(|occluders| {
+                visibility.lamps.iter().find(|occluders| occluders.node == node).and_then(|occluders| {
                     match occluders.emitters.is_empty() {
                         true => Some(unoccluded()),
-                        false => self.seen_past(occluders, sequence, (own, set), point, direct),
+                        false => self.visible_past_occluders(occluders, sequence, (own, set), point, direct),
                     }
                 });
             // What one term for many emitters leaves.
-            let by_terms = if self.emitter_tree.emitters(part) > EXACT_EMITTERS { TERM_ERROR } else { 0.0 };
+            let by_terms = if self.emitter_tree.emitters(node) > EXACT_EMITTERS { TERM_ERROR } else { 0.0 };
             if let Some((light, variance)) = known {
                 irradiance += light;
                 direct.variance += variance + (by_terms * grey(light)).powi(2);
                 continue;
             }
-            let mut share = self.seen_share(part, &anchor, sequence, (own, set), point, direct);
+            let mut share = self.visible_fraction(node, &anchor, sequence, (own, set), point, direct);
             if share.mean == Vec3::ZERO && share.asked > 0 {
                 continue;
             }
             let (light, uneven) = unoccluded();
             if share.asked == 0 && light != Vec3::ZERO {
                 // Of few samples all may be of sides that look away.
-                share = self.seen_share(part, &anchor, sequence, (AGAIN * own, set), point, direct);
+                share = self.visible_fraction(node, &anchor, sequence, (AGAIN * own, set), point, direct);
             }
             irradiance += light * share.mean;
             direct.variance += grey(light).powi(2) * share.variance + uneven * grey(share.mean).powi(2);
@@ -99,9 +99,9 @@ impl Sources<'_> {
 
     /// The light of a part of which it is known what may stand between, at as many points as are worth so many shadow rays, and its variance;
     /// `None` if some point sees it in too many pieces.
-    fn seen_past(
+    fn visible_past_occluders(
         &self,
-        occluders: &PartOccluders,
+        occluders: &LampOccluders,
         sequence: Sequence,
         (samples, set): (u32, u32),
         point: &impl Fn(f32, f32) -> Option<Receiver>,
@@ -131,7 +131,7 @@ impl Sources<'_> {
             sums[batch] += light;
             counts[batch] += 1;
         }
-        direct.seen.add(occluders.part, seen, hidden);
+        direct.seen.add(occluders.node, seen, hidden);
         direct.sampled = true;
         let count = counts.iter().sum::<u32>();
         if count == 0 {
@@ -146,9 +146,9 @@ impl Sources<'_> {
     }
 
     /// The share of a part's light that is seen, by so many samples of dimension set `set`.
-    fn seen_share(
+    fn visible_fraction(
         &self,
-        part: u32,
+        node: u32,
         anchor: &Receiver,
         sequence: Sequence,
         (samples, set): (u32, u32),
@@ -162,7 +162,7 @@ impl Sources<'_> {
             let at = batch_of(sample, samples);
             let [x, y, u, v] = sequence.point(sample, set);
             let Some(receiver) = point(x, y) else { continue };
-            let Chosen { emitter, u, probability } = self.emitter_tree.pick(part, anchor, u);
+            let EmitterChoice { emitter, u, probability } = self.emitter_tree.pick(node, anchor, u);
             let emitter = &self.emitters[emitter as usize];
             let Some(sample) = sample_emitter(emitter, &receiver, (u, v)) else { continue };
             let light = sample.light / probability;
@@ -171,7 +171,7 @@ impl Sources<'_> {
             }
             all += light;
             batch_all[at] += light.element_sum() / 3.0;
-            if self.hides(emitter, &sample, &receiver) {
+            if self.is_occluded(emitter, &sample, &receiver) {
                 hidden += 1;
             } else {
                 visible += 1;
@@ -181,7 +181,7 @@ impl Sources<'_> {
         }
         direct.rays += visible + hidden;
         direct.sampled = true;
-        direct.seen.add(part, visible, hidden);
+        direct.seen.add(node, visible, hidden);
         let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
         let mean = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));
         let grey = share(batch_seen.iter().sum(), batch_all.iter().sum());
@@ -194,7 +194,7 @@ impl Sources<'_> {
     }
 
     /// Whether something stands before a point of an emitter.
-    pub(crate) fn hides(&self, emitter: &Emitter, sample: &EmitterSample, receiver: &Receiver) -> bool {
+    pub(crate) fn is_occluded(&self, emitter: &Emitter, sample: &EmitterSample, receiver: &Receiver) -> bool {
         let (triangle, side) = (emitter.triangle, emitter.side);
         let target = self.scene.off_surface_seen_from(triangle, side, sample.target, receiver.origin);
         self.scene.blocked(receiver.origin, target)

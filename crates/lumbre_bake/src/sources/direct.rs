@@ -21,19 +21,19 @@ pub(crate) struct Direct {
     /// Whether samples had a part in it: more would tell more.
     pub sampled: bool,
     /// What of the sources was seen.
-    pub seen: Seen,
+    pub seen: VisibilitySummary,
 }
 
 /// What a receiver saw of the sources.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Seen {
+pub(crate) struct VisibilitySummary {
     /// Some source was seen by one sample and not by another: a penumbra, or a shadow's edge.
     pub partly: bool,
     /// One number for each combination of hidden sources.
     pub signature: u32,
 }
 
-impl Seen {
+impl VisibilitySummary {
     /// What the samples to source `id` found. Sources that are wholly seen, or that do not shine here, leave no mark: which of them
     /// are asked together differs from receiver to receiver.
     pub(crate) fn add(&mut self, id: u32, visible: u32, hidden: u32) {

@@ -23,7 +23,7 @@ pub(crate) struct EmitterBounds {
 }
 
 /// Least share of a cosine in a weight, so that none is 0 where light may arrive.
-pub(crate) const LEAST_COSINE: f32 = 0.02;
+pub(crate) const MIN_COSINE: f32 = 0.02;
 
 impl EmitterBounds {
     /// About what they bring receivers within `reach` of one (irradiance, sum of the channels); positive.
@@ -34,8 +34,8 @@ impl EmitterBounds {
         // Directions are a little short where they are near: all of it counts there anyway.
         let inverse = 1.0 / squared.sqrt();
         let subtends = size * inverse;
-        let receives = (towards.dot(receiver.normal) * inverse + subtends).clamp(LEAST_COSINE, 1.0);
-        let emits = (self.spread + subtends - towards.dot(self.axis) * inverse).clamp(LEAST_COSINE, 1.0);
+        let receives = (towards.dot(receiver.normal) * inverse + subtends).clamp(MIN_COSINE, 1.0);
+        let emits = (self.spread + subtends - towards.dot(self.axis) * inverse).clamp(MIN_COSINE, 1.0);
         self.power * receives * emits * inverse * inverse
     }
 }
@@ -99,9 +99,9 @@ impl BoundsEight {
         let squared = dot(towards, towards) + radius * radius;
         let inverse = one / squared.sqrt();
         let subtends = radius * inverse;
-        let receives = (dot(towards, normal) * inverse + subtends).max(LEAST_COSINE).min(1.0);
+        let receives = (dot(towards, normal) * inverse + subtends).max(MIN_COSINE).min(1.0);
         let emits = spread + subtends - dot(towards, [along_x, along_y, along_z]) * inverse;
-        let emits = emits.max(LEAST_COSINE).min(1.0);
+        let emits = emits.max(MIN_COSINE).min(1.0);
         let mut found = [0.0; LANES];
         (power * receives * emits * inverse * inverse).store_slice(&mut found);
         found

@@ -8,7 +8,7 @@ use std::f32::consts::PI;
 use glam::{DVec3, Mat3, Vec3};
 
 use super::emitter_bounds::EmitterBounds;
-use super::emitter_walk::{Chosen, EmitterWalk, Kind};
+use super::emitter_walk::{EmitterChoice, EmitterWalk, Kind};
 use super::emitters::Emitter;
 use crate::scene::Receiver;
 use crate::visibility::polygon::point_to_triangle;
@@ -53,7 +53,7 @@ pub(crate) const TERM_ERROR: f32 = 0.005;
 /// Lamps whose common ball has at most this sine cast one shadow.
 const NARROW: f32 = 0.02;
 /// Parts that are opened at most to tell how much of what a receiver sees shines.
-const MOST_OPENED: usize = 64;
+const MAX_OPENED: usize = 64;
 
 impl EmitterTree {
     /// Over all emitters; `lamps[i]` numbers the lamp of emitter i.
@@ -118,8 +118,8 @@ impl EmitterTree {
     }
 
     /// Where the emitters of a part are, where they shine to and how much.
-    pub fn bounds(&self, part: u32) -> EmitterBounds {
-        self.bounds[part as usize]
+    pub fn bounds(&self, index: u32) -> EmitterBounds {
+        self.bounds[index as usize]
     }
 
     /// The part that holds all emitters; none where there are none.
@@ -128,26 +128,26 @@ impl EmitterTree {
     }
 
     /// The two parts of a part, unless it is one emitter.
-    pub fn children(&self, part: u32) -> Option<[u32; 2]> {
-        match self.nodes[part as usize].kind {
+    pub fn children(&self, index: u32) -> Option<[u32; 2]> {
+        match self.nodes[index as usize].kind {
             Kind::Leaf(_) => None,
             Kind::Inner(children) => Some(children),
         }
     }
 
     /// How many lamps a part holds, wholly or in part.
-    pub fn lamps(&self, part: u32) -> u32 {
-        self.nodes[part as usize].lamps
+    pub fn lamps(&self, index: u32) -> u32 {
+        self.nodes[index as usize].lamps
     }
 
     /// How many emitters a part holds.
-    pub fn emitters(&self, part: u32) -> u32 {
-        self.nodes[part as usize].emitters
+    pub fn emitters(&self, index: u32) -> u32 {
+        self.nodes[index as usize].emitters
     }
 
     /// The sine under which a part's ball, larger by `reach`, appears from a receiver, at most 1.
-    pub fn sine(&self, part: u32, receiver: &Receiver, reach: f32) -> f32 {
-        let bounds = &self.bounds[part as usize];
+    pub fn sine(&self, index: u32, receiver: &Receiver, reach: f32) -> f32 {
+        let bounds = &self.bounds[index as usize];
         let distance = bounds.center.distance(receiver.position);
         let size = bounds.radius + reach;
         if size < distance { size / distance } else { 1.0 }
@@ -158,20 +158,20 @@ impl EmitterTree {
     pub fn form_factor(&self, receiver: &Receiver) -> f32 {
         let (mut sum, mut open, mut opened) = (0.0, Vec::new(), 0);
         open.extend(self.root());
-        while let Some(part) = open.pop() {
-            let sine = self.sine(part, receiver, 0.0);
-            match self.children(part).filter(|_| sine > 0.5 && opened < MOST_OPENED) {
+        while let Some(index) = open.pop() {
+            let sine = self.sine(index, receiver, 0.0);
+            match self.children(index).filter(|_| sine > 0.5 && opened < MAX_OPENED) {
                 Some(halves) => {
                     opened += 1;
                     open.extend(halves);
                 }
                 None => {
-                    let bounds = &self.bounds[part as usize];
+                    let bounds = &self.bounds[index as usize];
                     let direction = (bounds.center - receiver.position).normalize_or_zero();
                     let receives = (direction.dot(receiver.normal) + sine).clamp(0.0, 1.0);
                     let emits = (bounds.spread - direction.dot(bounds.axis)).clamp(0.0, 1.0);
                     let squared = (bounds.center - receiver.position).length_squared();
-                    let of_area = self.nodes[part as usize].area / (PI * squared.max(f32::MIN_POSITIVE));
+                    let of_area = self.nodes[index as usize].area / (PI * squared.max(f32::MIN_POSITIVE));
                     sum += receives * emits * of_area.min(sine * sine);
                 }
             }
@@ -199,18 +199,18 @@ impl EmitterTree {
     }
 
     /// The emitters of a part, by number.
-    pub fn emitters_of(&self, part: u32) -> &[u32] {
-        let node = &self.nodes[part as usize];
+    pub fn emitters_of(&self, index: u32) -> &[u32] {
+        let node = &self.nodes[index as usize];
         &self.order[node.first as usize..(node.first + node.emitters) as usize]
     }
 
     /// Irradiance of a part as if nothing were between.
-    pub fn unoccluded(&self, emitters: &[Emitter], part: u32, receiver: &Receiver) -> Vec3 {
-        let opening = if self.emitters(part) <= EXACT_EMITTERS { 0.0 } else { OPENING };
+    pub fn unoccluded(&self, emitters: &[Emitter], index: u32, receiver: &Receiver) -> Vec3 {
+        let opening = if self.emitters(index) <= EXACT_EMITTERS { 0.0 } else { OPENING };
         let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
         let mut sum = DVec3::ZERO;
         let mut open = Vec::with_capacity(64);
-        open.push(part);
+        open.push(index);
         while let Some(index) = open.pop() {
             let (node, bounds) = (&self.nodes[index as usize], &self.bounds[index as usize]);
             let children = match node.kind {
@@ -264,8 +264,8 @@ impl EmitterTree {
     }
 
     /// An emitter of a part at `u` in [0, 1): about in proportion to what it brings a receiver.
-    pub fn pick(&self, part: u32, receiver: &Receiver, u: f32) -> Chosen {
-        self.walk.choose(&self.bounds, part, receiver, u)
+    pub fn pick(&self, index: u32, receiver: &Receiver, u: f32) -> EmitterChoice {
+        self.walk.choose(&self.bounds, index, receiver, u)
     }
 
     /// About what a part brings receivers within `reach` of one (irradiance, sum of the channels); positive.

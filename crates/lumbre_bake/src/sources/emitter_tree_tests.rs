@@ -83,14 +83,14 @@ fn a_part_holds_the_emitters_of_its_halves() {
     all.sort_unstable();
     assert!(all.iter().copied().eq(0..emitters.len() as u32));
     let (mut open, mut lamps_found) = (vec![root], Vec::new());
-    while let Some(part) = open.pop() {
-        let Some(halves) = tree.children(part) else { continue };
+    while let Some(node) = open.pop() {
+        let Some(halves) = tree.children(node) else { continue };
         let together: Vec<u32> = halves.iter().flat_map(|&half| tree.emitters_of(half)).copied().collect();
-        assert_eq!(tree.emitters_of(part), together);
+        assert_eq!(tree.emitters_of(node), together);
         for half in halves {
-            if tree.lamps(half) == 1 && tree.lamps(part) > 1 {
+            if tree.lamps(half) == 1 && tree.lamps(node) > 1 {
                 let own: Vec<u32> = tree.emitters_of(half).iter().map(|&e| lamps[e as usize]).collect();
-                assert!(own.iter().all(|lamp| *lamp == own[0]), "a lamp is one part");
+                assert!(own.iter().all(|lamp| *lamp == own[0]), "a lamp is one node");
                 lamps_found.push(own[0]);
             }
         }
@@ -108,10 +108,10 @@ fn no_weight_is_zero_and_near_balls_fill_the_sky() {
     for i in 0..200 {
         let [x, y, z, w] = Sequence::new(5, Stream::Test(0), 0).point(i, 0);
         let at = receiver(Vec3::new(3.0 * x - 1.5, 2.0 * y - 0.4, 3.0 * z - 1.5), Vec3::Y);
-        for part in 0..emitters.len() as u32 {
-            assert!(tree.weight(part, &at, 0.1 * w) > 0.0);
-            assert!((0.0..=1.0).contains(&tree.sine(part, &at, 0.0)));
-            assert!(tree.sine(part, &at, 0.5) >= tree.sine(part, &at, 0.0));
+        for node in 0..emitters.len() as u32 {
+            assert!(tree.weight(node, &at, 0.1 * w) > 0.0);
+            assert!((0.0..=1.0).contains(&tree.sine(node, &at, 0.0)));
+            assert!(tree.sine(node, &at, 0.5) >= tree.sine(node, &at, 0.0));
         }
     }
     assert_eq!(tree.sine(0, &receiver(Vec3::new(0.2, 0.9, 0.0), Vec3::Y), 0.0), 1.0);
@@ -123,15 +123,15 @@ fn samples_have_the_light_of_their_part_as_their_mean() {
     let (emitters, lamps) = scene();
     let tree = EmitterTree::new(&emitters, &lamps);
     // Walks that begin at a step and within one.
-    let mut parts = vec![0];
+    let mut nodes = vec![0];
     for place in 0..20 {
-        parts.extend(tree.children(parts[place]).into_iter().flatten());
+        nodes.extend(tree.children(nodes[place]).into_iter().flatten());
     }
     for position in [Vec3::ZERO, Vec3::new(-0.5, 0.2, 0.3), Vec3::new(0.3, 0.8, 0.1)] {
         let at = receiver(position, Vec3::Y);
-        for &part in &parts {
+        for &node in &nodes {
             let own: Vec<Emitter> =
-                tree.emitters_of(part).iter().map(|&emitter| emitters[emitter as usize].clone()).collect();
+                tree.emitters_of(node).iter().map(|&emitter| emitters[emitter as usize].clone()).collect();
             let expected = exact(&own, &at);
             if expected.element_sum() < 1e-2 * exact(&emitters, &at).element_sum() {
                 continue;
@@ -139,8 +139,8 @@ fn samples_have_the_light_of_their_part_as_their_mean() {
             let (n, mut sum) = (1 << 14, DVec3::ZERO);
             for i in 0..n {
                 let [u, a, b, _] = Sequence::new(1, Stream::Test(0), 0).point(i, 0);
-                let Chosen { emitter, probability, .. } = tree.pick(part, &at, u);
-                assert!(tree.emitters_of(part).contains(&emitter), "{emitter} is none of part {part}");
+                let EmitterChoice { emitter, probability, .. } = tree.pick(node, &at, u);
+                assert!(tree.emitters_of(node).contains(&emitter), "{emitter} is none of node {node}");
                 let e = &emitters[emitter as usize];
                 let (s, t) = crate::sampling::triangle_point(a, b);
                 let towards =
@@ -154,7 +154,7 @@ fn samples_have_the_light_of_their_part_as_their_mean() {
             let found = sum / f64::from(n);
             // Relative deviation of a sample about 1: 5 sigma of 2^14 independent ones is 4 %; these are spread better.
             let apart = (found - expected).abs().max_element() / expected.max_element();
-            assert!(apart < 0.02, "{position}, part {part}: {found} {expected}");
+            assert!(apart < 0.02, "{position}, node {node}: {found} {expected}");
         }
     }
 }

@@ -16,7 +16,7 @@ pub(crate) enum Kind {
 
 /// Where a sample may go from a part.
 #[derive(Clone, Copy, Debug)]
-enum Next {
+enum WalkStep {
     Emitter(u32),
     /// To one of the parts of a step, by its number.
     Step(u32),
@@ -28,7 +28,7 @@ enum Next {
 #[derive(Clone, Debug)]
 struct Step {
     bounds: BoundsEight,
-    next: [Next; LANES],
+    next: [WalkStep; LANES],
     count: usize,
 }
 
@@ -37,12 +37,12 @@ struct Step {
 pub(crate) struct EmitterWalk {
     steps: Vec<Step>,
     /// Of each part of the tree.
-    next: Vec<Next>,
+    next: Vec<WalkStep>,
 }
 
 /// An emitter that was chosen.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Chosen {
+pub(crate) struct EmitterChoice {
     pub emitter: u32,
     /// The place within its interval of [0, 1), stretched to [0, 1).
     pub u: f32,
@@ -53,56 +53,56 @@ impl EmitterWalk {
     /// Down a tree whose children come after their parents; the first part is the root.
     pub fn new(kinds: &[Kind], bounds: &[EmitterBounds]) -> Self {
         let mut emitters = vec![1u32; kinds.len()];
-        for (part, kind) in kinds.iter().enumerate().rev() {
+        for (node, kind) in kinds.iter().enumerate().rev() {
             if let Kind::Inner([near, far]) = *kind {
-                emitters[part] = emitters[near as usize] + emitters[far as usize];
+                emitters[node] = emitters[near as usize] + emitters[far as usize];
             }
         }
         let next = |kind: &Kind| match *kind {
-            Kind::Leaf(emitter) => Next::Emitter(emitter),
-            Kind::Inner(halves) => Next::Halves(halves),
+            Kind::Leaf(emitter) => WalkStep::Emitter(emitter),
+            Kind::Inner(halves) => WalkStep::Halves(halves),
         };
         let mut walk = Self { steps: Vec::new(), next: kinds.iter().map(next).collect() };
         let mut pending = Vec::from_iter((!kinds.is_empty()).then_some(0u32));
         let mut parts_of_steps = Vec::new();
-        while let Some(part) = pending.pop() {
-            let Kind::Inner(halves) = kinds[part as usize] else { continue };
+        while let Some(node) = pending.pop() {
+            let Kind::Inner(halves) = kinds[node as usize] else { continue };
             // The largest is opened, until they are eight.
-            let mut parts = Vec::from(halves);
-            while parts.len() < LANES {
-                let largest = (0..parts.len()).max_by_key(|&place| emitters[parts[place] as usize]);
-                let Some((place, halves)) = largest.and_then(|place| match kinds[parts[place] as usize] {
+            let mut nodes = Vec::from(halves);
+            while nodes.len() < LANES {
+                let largest = (0..nodes.len()).max_by_key(|&place| emitters[nodes[place] as usize]);
+                let Some((place, halves)) = largest.and_then(|place| match kinds[nodes[place] as usize] {
                     Kind::Leaf(_) => None,
                     Kind::Inner(halves) => Some((place, halves)),
                 }) else {
                     break;
                 };
-                parts.splice(place..=place, halves);
+                nodes.splice(place..=place, halves);
             }
-            walk.next[part as usize] = Next::Step(parts_of_steps.len() as u32);
-            pending.extend(&parts);
-            parts_of_steps.push(parts);
+            walk.next[node as usize] = WalkStep::Step(parts_of_steps.len() as u32);
+            pending.extend(&nodes);
+            parts_of_steps.push(nodes);
         }
-        let step = |parts: &Vec<u32>| {
-            let mut next = [Next::Emitter(0); LANES];
-            next.iter_mut().zip(parts).for_each(|(next, &part)| *next = walk.next[part as usize]);
-            let bounds: Vec<EmitterBounds> = parts.iter().map(|&part| bounds[part as usize]).collect();
-            Step { bounds: BoundsEight::new(&bounds), next, count: parts.len() }
+        let step = |nodes: &Vec<u32>| {
+            let mut next = [WalkStep::Emitter(0); LANES];
+            next.iter_mut().zip(nodes).for_each(|(next, &node)| *next = walk.next[node as usize]);
+            let bounds: Vec<EmitterBounds> = nodes.iter().map(|&node| bounds[node as usize]).collect();
+            Step { bounds: BoundsEight::new(&bounds), next, count: nodes.len() }
         };
         walk.steps = parts_of_steps.iter().map(step).collect();
         walk
     }
 
     /// The emitter of a part at `u` in [0, 1): about in proportion to what it brings a receiver. `bounds` are those of the tree's parts.
-    pub fn choose(&self, bounds: &[EmitterBounds], part: u32, receiver: &Receiver, u: f32) -> Chosen {
+    pub fn choose(&self, bounds: &[EmitterBounds], node: u32, receiver: &Receiver, u: f32) -> EmitterChoice {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         if let Some(simd) = LEVEL.as_avx2() {
             return simd.vectorize(
                 #[inline(always)]
-                || self.choose_with(simd, bounds, part, receiver, u),
+                || self.choose_with(simd, bounds, node, receiver, u),
             );
         }
-        dispatch!(*LEVEL, simd => self.choose_with(simd, bounds, part, receiver, u))
+        dispatch!(*LEVEL, simd => self.choose_with(simd, bounds, node, receiver, u))
     }
 
     #[inline(always)]
@@ -110,23 +110,23 @@ impl EmitterWalk {
         &self,
         simd: S,
         bounds: &[EmitterBounds],
-        part: u32,
+        node: u32,
         receiver: &Receiver,
         mut u: f32,
-    ) -> Chosen {
+    ) -> EmitterChoice {
         let lanes = ReceiverLanes::new(simd, receiver);
-        let (mut next, mut probability) = (self.next[part as usize], 1.0);
+        let (mut next, mut probability) = (self.next[node as usize], 1.0);
         loop {
             next = match next {
-                Next::Emitter(emitter) => return Chosen { emitter, u, probability },
-                Next::Step(step) => {
+                WalkStep::Emitter(emitter) => return EmitterChoice { emitter, u, probability },
+                WalkStep::Step(step) => {
                     let step = &self.steps[step as usize];
                     let weights = step.bounds.weights(&lanes);
                     let (lane, share, within) = pick(&weights[..step.count], u);
                     (probability, u) = (probability * share, within);
                     step.next[lane]
                 }
-                Next::Halves(halves) => {
+                WalkStep::Halves(halves) => {
                     let weights = halves.map(|half| bounds[half as usize].weight(receiver, 0.0));
                     let (half, share, within) = pick(&weights, u);
                     (probability, u) = (probability * share, within);

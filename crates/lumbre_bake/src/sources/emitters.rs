@@ -58,12 +58,12 @@ pub(crate) fn lamps(scene: &BakeScene, emitters: &[Emitter]) -> Vec<u32> {
 /// Texels of a texture along an edge of a piece, if that is not more than so many pieces along the edge of a triangle: what is finer
 /// is averaged.
 const TEXELS: f32 = 2.0;
-const MOST_PIECES: u32 = 48;
+const MAX_PIECES: u32 = 48;
 /// Pieces of all triangles together, beside one each.
-const MOST_OF_ALL: f64 = 200_000.0;
+const MAX_OF_ALL: f64 = 200_000.0;
 /// Points along an edge of a piece over which its radiance is averaged, at most; and of all pieces together.
-const MOST_POINTS: u32 = 64;
-const MOST_SAMPLES: f64 = (1 << 26) as f64;
+const MAX_POINTS: u32 = 64;
+const MAX_SAMPLES: f64 = (1 << 26) as f64;
 
 /// By how much all have to be coarser than their textures ask for, so that they are not too many.
 #[derive(Clone, Copy)]
@@ -88,10 +88,10 @@ impl Reading {
             return Self { texels: 0.0, pieces: 1, points: 1 };
         }
         let texels = surface.emission_texels(vertices);
-        let pieces = ((texels / (TEXELS * coarser.pieces)).ceil() as u32).clamp(1, MOST_PIECES);
+        let pieces = ((texels / (TEXELS * coarser.pieces)).ceil() as u32).clamp(1, MAX_PIECES);
         // Two points for each texel, so that none is left out.
         let points = (2.0 * texels / (pieces as f32 * coarser.points)).ceil() as u32;
-        Self { texels, pieces, points: points.clamp(2, MOST_POINTS) }
+        Self { texels, pieces, points: points.clamp(2, MAX_POINTS) }
     }
 }
 
@@ -99,8 +99,10 @@ impl Coarser {
     fn of(scene: &BakeScene) -> Self {
         let asked = Self { pieces: 1.0, points: 1.0 };
         let sum = |coarser: Self, of: fn(Reading) -> f64| -> f64 {
-            let lit =
-                scene.triangles.iter().filter(|triangle| !triangle.superseded && !scene.stop.is_cancelled());
+            let lit = scene
+                .triangles
+                .iter()
+                .filter(|triangle| !triangle.is_hidden_duplicate && !scene.stop.is_cancelled());
             let of_triangle = |triangle: &SceneTriangle| {
                 let surface = &scene.surfaces[triangle.surface as usize];
                 match surface.material.front.emission == Vec3::ZERO && surface.material.back.is_none() {
@@ -111,10 +113,10 @@ impl Coarser {
             lit.map(of_triangle).sum()
         };
         let pieces = sum(asked, |reading| f64::from(reading.pieces).powi(2) - 1.0);
-        let pieces = (pieces / MOST_OF_ALL).sqrt().max(1.0) as f32;
+        let pieces = (pieces / MAX_OF_ALL).sqrt().max(1.0) as f32;
         let points =
             sum(Self { pieces, ..asked }, |reading| f64::from(reading.pieces * reading.points).powi(2));
-        Self { pieces, points: (points / MOST_SAMPLES).sqrt().max(1.0) as f32 }
+        Self { pieces, points: (points / MAX_SAMPLES).sqrt().max(1.0) as f32 }
     }
 }
 
@@ -124,7 +126,7 @@ pub(crate) fn coarse_textures(scene: &BakeScene) -> Vec<String> {
     // Of each object the triangle with the largest pieces.
     let mut worst: BTreeMap<u32, Reading> = BTreeMap::new();
     let across = |reading: &Reading| reading.texels / reading.pieces as f32;
-    for triangle in scene.triangles.iter().filter(|triangle| !triangle.superseded) {
+    for triangle in scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate) {
         let surface = &scene.surfaces[triangle.surface as usize];
         let sides = [Some(&surface.material.front), surface.material.back.as_ref()];
         if sides.into_iter().flatten().any(|side| side.emission != Vec3::ZERO) {
@@ -156,7 +158,7 @@ pub(crate) fn coarse_textures(scene: &BakeScene) -> Vec<String> {
 pub(crate) fn emitters(scene: &BakeScene) -> Vec<Emitter> {
     let mut found = Vec::new();
     let coarser = Coarser::of(scene);
-    for (index, triangle) in scene.triangles.iter().enumerate().filter(|(_, t)| !t.superseded) {
+    for (index, triangle) in scene.triangles.iter().enumerate().filter(|(_, t)| !t.is_hidden_duplicate) {
         let surface = &scene.surfaces[triangle.surface as usize];
         for side in [Side::Front, Side::Back] {
             if scene.stop.is_cancelled() {

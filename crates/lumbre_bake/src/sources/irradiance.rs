@@ -9,7 +9,7 @@ use crate::scene::Receiver;
 use crate::visibility::occluders::Visibility;
 
 /// Samples of the sources that share them, for each of a source that has samples of its own.
-const SAMPLES_OF_REST: u32 = 4;
+const SAMPLES_OF_SHARED: u32 = 4;
 
 impl Sources<'_> {
     /// Mean irradiance of a receiver by `samples` shadow rays to each source that matters and some to the others together; `point` maps the
@@ -25,14 +25,14 @@ impl Sources<'_> {
         let corners = corners.iter().filter_map(|&(x, y)| point(x, y));
         let reach = corners.map(|corner| corner.position.distance(anchor.position)).fold(0.0, f32::max);
         let cut = self.cut(&anchor, reach, &[]);
-        let mut direct = self.own(&cut, &Visibility::UNKNOWN, sequence, samples, point);
-        self.rest(&cut.rest, sequence, SAMPLES_OF_REST * samples, point, &mut direct);
+        let mut direct = self.irradiance_per_source(&cut, &Visibility::UNKNOWN, sequence, samples, point);
+        self.add_shared_light(&cut.shared, sequence, SAMPLES_OF_SHARED * samples, point, &mut direct);
         direct
     }
 
     /// Mean irradiance by the sources that have samples of their own; without shadow rays where it is known what may stand `between`: those
     /// are as exact as the receiver's points.
-    pub fn own(
+    pub fn irradiance_per_source(
         &self,
         cut: &LightCut,
         visibility: &Visibility<'_>,
@@ -42,7 +42,8 @@ impl Sources<'_> {
     ) -> Direct {
         let mut direct = Direct::default();
         if !cut.lamps.is_empty() {
-            let light = self.emitted(&cut.lamps, visibility, sequence, samples, point, &mut direct);
+            let light =
+                self.area_light_irradiance(&cut.lamps, visibility, sequence, samples, point, &mut direct);
             direct.baked += light;
         }
         self.punctual(&cut.lights, visibility, sequence, samples, point, &mut direct);

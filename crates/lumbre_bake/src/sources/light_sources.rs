@@ -19,7 +19,7 @@ pub(crate) struct Sources<'a> {
     pub lights: Vec<PlacedLight>,
     pub(crate) light_tree: LightTree,
     /// Lights that have samples of their own everywhere, by number: those in the sky, and all where they are few.
-    pub(crate) lights_apart: Vec<u32>,
+    pub(crate) individually_sampled_lights: Vec<u32>,
     /// Irradiance that a surface gets of an unhidden sky: π times its radiance, W/m². Not direct light here: the rays of the
     /// form factors and of the final gather find it where they meet nothing.
     pub sky: Vec3,
@@ -34,9 +34,9 @@ impl<'a> Sources<'a> {
         let emitter_tree = EmitterTree::new(&emitters, &lamps(scene, &emitters));
         let few = lights.len() <= FEW_LIGHTS;
         let shares_samples = |index: &u32| !few && has_place(&lights[*index as usize]);
-        let (together, lights_apart) = (0..lights.len() as u32).partition(shares_samples);
+        let (together, individually_sampled_lights) = (0..lights.len() as u32).partition(shares_samples);
         let light_tree = LightTree::new(&lights, together, scene.space);
-        Self { scene, emitters, emitter_tree, lights, light_tree, lights_apart, sky: sky * PI }
+        Self { scene, emitters, emitter_tree, lights, light_tree, individually_sampled_lights, sky: sky * PI }
     }
 
     /// The emissive triangles among them that are to be kept, and no lights.
@@ -49,7 +49,7 @@ impl<'a> Sources<'a> {
             emitter_tree,
             lights: Vec::new(),
             light_tree: LightTree::default(),
-            lights_apart: Vec::new(),
+            individually_sampled_lights: Vec::new(),
             sky: Vec3::ZERO,
         }
     }
@@ -65,8 +65,8 @@ impl<'a> Sources<'a> {
     }
 
     /// The emitters of a part of the emissive surfaces, by number.
-    pub fn emitters_of(&self, part: u32) -> &[u32] {
-        self.emitter_tree.emitters_of(part)
+    pub fn emitters_of(&self, node: u32) -> &[u32] {
+        self.emitter_tree.emitters_of(node)
     }
 }
 
@@ -78,7 +78,7 @@ pub(crate) fn shines_inside_only(
     sky: Vec3,
 ) -> bool {
     let inside =
-        |points: &[Vec3]| scene.rooms.iter().any(|room| points.iter().all(|&point| room.surely_holds(point)));
+        |points: &[Vec3]| scene.rooms.iter().any(|room| points.iter().all(|&point| room.contains(point)));
     let light = |placed: &PlacedLight| {
         placed.light.kind != LightKind::Directional && inside(&[scene.space.position(placed.position)])
     };

@@ -7,7 +7,7 @@ use std::f32::consts::PI;
 use glam::{DVec3, Vec3};
 use lumbre_optics::LightKind;
 
-use super::emitter_bounds::LEAST_COSINE;
+use super::emitter_bounds::MIN_COSINE;
 use super::emitter_tree::split;
 use crate::scene::Receiver;
 use crate::scene::{Canonical, PlacedLight};
@@ -76,16 +76,16 @@ impl LightTree {
     }
 
     /// The two parts of a part, or the number of its only light.
-    pub fn children(&self, part: u32) -> Result<[u32; 2], u32> {
-        match self.nodes[part as usize].kind {
+    pub fn children(&self, index: u32) -> Result<[u32; 2], u32> {
+        match self.nodes[index as usize].kind {
             Kind::Leaf(light) => Err(light),
             Kind::Inner(children) => Ok(children),
         }
     }
 
     /// The sine under which a part's ball, larger by `reach`, appears from a receiver, at most 1.
-    pub fn sine(&self, part: u32, receiver: &Receiver, reach: f32) -> f32 {
-        let node = &self.nodes[part as usize];
+    pub fn sine(&self, index: u32, receiver: &Receiver, reach: f32) -> f32 {
+        let node = &self.nodes[index as usize];
         let distance = node.center.distance(receiver.position);
         let size = node.radius + reach;
         if size < distance { size / distance } else { 1.0 }
@@ -93,8 +93,8 @@ impl LightTree {
 
     /// A light of a part at `u` in [0, 1), and its probability: about in proportion to what it brings a receiver. None where no light of the
     /// part reaches as far.
-    pub fn pick(&self, part: u32, receiver: &Receiver, mut u: f32) -> Option<(u32, f32)> {
-        let (mut index, mut probability) = (part, 1.0f32);
+    pub fn pick(&self, index: u32, receiver: &Receiver, mut u: f32) -> Option<(u32, f32)> {
+        let (mut index, mut probability) = (index, 1.0f32);
         loop {
             let [near, far] = match self.nodes[index as usize].kind {
                 Kind::Leaf(light) => return Some((light, probability)),
@@ -112,8 +112,8 @@ impl LightTree {
     }
 
     /// About what a part brings receivers within `reach` of one (irradiance, sum of the channels); 0 only where none of it arrives at any of them.
-    pub fn weight(&self, part: u32, receiver: &Receiver, reach: f32) -> f32 {
-        let node = &self.nodes[part as usize];
+    pub fn weight(&self, index: u32, receiver: &Receiver, reach: f32) -> f32 {
+        let node = &self.nodes[index as usize];
         let towards = node.center - receiver.position;
         let (away, size) = (towards.length_squared(), node.radius + reach);
         if away > (node.range + size).powi(2) {
@@ -123,7 +123,7 @@ impl LightTree {
         let distance = squared.sqrt();
         let direction = towards.normalize_or_zero();
         let subtends = size / distance.max(f32::MIN_POSITIVE);
-        let receives = (direction.dot(receiver.normal) + subtends).clamp(LEAST_COSINE, 1.0);
+        let receives = (direction.dot(receiver.normal) + subtends).clamp(MIN_COSINE, 1.0);
         let [constant, linear, quadratic] = node.law;
         let law = constant + linear * distance + quadratic * squared;
         // An angle's sine is less than the angle, so that this is a little narrow: those outside count, too.

@@ -41,7 +41,7 @@ pub(crate) struct LightSample {
 
 /// A light at a receiver, by all its samples.
 #[derive(Default)]
-struct Sum {
+struct LightEstimate {
     center: [f32; BATCHES],
     disc: [f32; BATCHES],
     seen: [f32; BATCHES],
@@ -51,14 +51,14 @@ struct Sum {
     sets: bool,
 }
 
-impl Sum {
-    fn add(&mut self, part: &LightSample, batch: usize) {
-        self.center[batch] += part.center;
-        self.disc[batch] += part.disc;
-        self.sets |= part.disc <= 0.0;
-        if part.visible {
+impl LightEstimate {
+    fn add(&mut self, sample: &LightSample, batch: usize) {
+        self.center[batch] += sample.center;
+        self.disc[batch] += sample.disc;
+        self.sets |= sample.disc <= 0.0;
+        if sample.visible {
             self.visible += 1;
-            self.seen[batch] += part.disc;
+            self.seen[batch] += sample.disc;
         } else {
             self.hidden += 1;
         }
@@ -101,11 +101,11 @@ impl Sources<'_> {
         direct: &mut Direct,
     ) {
         for &index in lights {
-            self.one(index, visibility, sequence, samples, point, direct);
+            self.light_irradiance(index, visibility, sequence, samples, point, direct);
         }
     }
 
-    fn one(
+    fn light_irradiance(
         &self,
         index: u32,
         visibility: &Visibility<'_>,
@@ -125,8 +125,9 @@ impl Sources<'_> {
             Some(known) if !placed.is_sized() => self.past_shadows(index, known, visibility, point, direct),
             known => {
                 let clear = matches!(known, Some(LightVisibility::Clear));
-                let center = if placed.is_sized() { None } else { self.near(placed, visibility, point) };
-                self.sampled(index, (clear, center), sequence, samples, point, direct)
+                let center =
+                    if placed.is_sized() { None } else { self.near_field_mean(placed, visibility, point) };
+                self.by_shadow_rays(index, (clear, center), sequence, samples, point, direct)
             }
         };
         let color = placed.light.diffuse;
@@ -140,7 +141,7 @@ impl Sources<'_> {
     }
 
     /// Of a light without size that is near a receiver on a plane the mean over all of it, whatever lies between.
-    fn near(
+    fn near_field_mean(
         &self,
         light: &PlacedLight,
         visibility: &Visibility<'_>,
@@ -151,7 +152,7 @@ impl Sources<'_> {
 
     /// Mean irradiance of a light per unit of its colour, and its variance, by samples; by no rays if all is `clear`, and that of its `center`
     /// as it is known, if it is.
-    fn sampled(
+    fn by_shadow_rays(
         &self,
         index: u32,
         (clear, center): (bool, Option<f32>),
@@ -161,7 +162,7 @@ impl Sources<'_> {
         direct: &mut Direct,
     ) -> (f32, f32) {
         let light = &self.lights[index as usize];
-        let mut sum = Sum::default();
+        let mut sum = LightEstimate::default();
         let sequence = sequence.of(1 + index);
         let sized = light.is_sized();
         let samples = if center.is_some() && !clear { samples.max(NEAR_SAMPLES) } else { samples };
@@ -169,8 +170,8 @@ impl Sources<'_> {
             let [a, b, c, d] = sequence.point(sample, 0);
             let (x, y, u, v) = if sized { (c, d, a, b) } else { (a, b, c, d) };
             let Some(receiver) = point(x, y) else { continue };
-            if let Some(part) = part(self.scene, light, &receiver, (u, v), clear) {
-                sum.add(&part, batch_of(sample, samples));
+            if let Some(sampled) = sample_light(self.scene, light, &receiver, (u, v), clear) {
+                sum.add(&sampled, batch_of(sample, samples));
             }
         }
         direct.rays += if clear { 0 } else { sum.visible + sum.hidden };
@@ -192,7 +193,7 @@ impl Sources<'_> {
         let light = &self.lights[index as usize];
         let arriving = |receiver: &Receiver| of_center(self.scene, light, receiver);
         let by_points = || ReceiverQuadrature::mean(|x, y| Some(Vec3::splat(arriving(&point(x, y)?))));
-        let open = || match self.near(light, visibility, point) {
+        let open = || match self.near_field_mean(light, visibility, point) {
             Some(mean) => (Vec3::splat(mean), 0.0),
             None => by_points(),
         };
@@ -233,7 +234,7 @@ impl Sources<'_> {
 /// The disc is that of directions within the sphere's silhouette, sin θ = radius / distance, sampled evenly in its projection onto
 /// the plane across the axis to its centre. With ω the direction, E = strength · ⟨V n·ω / a·ω⟩: a sphere of one radiance gives
 /// exactly n·a where it is whole above the horizon, as a point does.
-pub(crate) fn part(
+pub(crate) fn sample_light(
     scene: &BakeScene,
     placed: &PlacedLight,
     receiver: &Receiver,

@@ -5,8 +5,8 @@
 use glam::Vec3;
 use lumbre_optics::BakeMode;
 
-use super::emitter_walk::Chosen;
-use super::light_cut::{Branch, Rest};
+use super::emitter_walk::EmitterChoice;
+use super::light_cut::{Branch, SharedSources};
 use super::punctual::{self, FIRST_ID};
 use crate::sampling::Sequence;
 use crate::scene::Receiver;
@@ -35,56 +35,63 @@ const SOURCE_SET: u32 = 33;
 
 impl Sources<'_> {
     /// One sample at a receiver by three numbers in [0, 1): which source, and where on it.
-    pub fn sample(&self, rest: &Rest, receiver: &Receiver, [choice, u, v]: [f32; 3]) -> SourceSample {
+    pub fn sample(
+        &self,
+        shared: &SharedSources,
+        receiver: &Receiver,
+        [choice, u, v]: [f32; 3],
+    ) -> SourceSample {
         let nothing = SourceSample::default();
-        let Some((branch, choice, of_branch)) = self.pick_branch(rest, receiver, choice) else {
+        let Some((branch, choice, of_branch)) = self.pick_branch(shared, receiver, choice) else {
             return nothing;
         };
         match branch {
-            Branch::Emitters(part) => {
-                let Chosen { emitter, probability, .. } = self.emitter_tree.pick(part, receiver, choice);
+            Branch::Emitters(node) => {
+                let EmitterChoice { emitter, probability, .. } =
+                    self.emitter_tree.pick(node, receiver, choice);
                 let emitter = &self.emitters[emitter as usize];
                 let Some(sample) = sample_emitter(emitter, receiver, (u, v)) else { return nothing };
                 let light = sample.light / (probability * of_branch);
                 if !light.is_finite() {
                     return nothing;
                 }
-                let hidden = self.hides(emitter, &sample, receiver);
+                let hidden = self.is_occluded(emitter, &sample, receiver);
                 let baked = if hidden { Vec3::ZERO } else { light };
                 let inverse_distance = sample.distance.max(f32::MIN_POSITIVE).recip();
                 SourceSample { baked, mixed: Vec3::ZERO, asked: true, hidden, inverse_distance }
             }
-            Branch::Lights(part) => {
-                let Some((light, probability)) = self.light_tree.pick(part, receiver, choice) else {
+            Branch::Lights(node) => {
+                let Some((light, probability)) = self.light_tree.pick(node, receiver, choice) else {
                     return nothing;
                 };
                 let placed = &self.lights[light as usize];
-                let Some(part) = punctual::part(self.scene, placed, receiver, (u, v), false) else {
+                let Some(sampled) = punctual::sample_light(self.scene, placed, receiver, (u, v), false)
+                else {
                     return nothing;
                 };
-                let light = placed.light.diffuse * (part.disc.max(0.0) / (probability * of_branch));
-                let light = if part.visible && light.is_finite() { light } else { Vec3::ZERO };
+                let light = placed.light.diffuse * (sampled.disc.max(0.0) / (probability * of_branch));
+                let light = if sampled.visible && light.is_finite() { light } else { Vec3::ZERO };
                 let distance = self.scene.space.position(placed.position).distance(receiver.position);
                 let (baked, mixed) = match placed.light.bake {
                     BakeMode::Static => (light, Vec3::ZERO),
                     BakeMode::Mixed | BakeMode::Dynamic => (Vec3::ZERO, light),
                 };
                 let inverse_distance = distance.max(f32::MIN_POSITIVE).recip();
-                SourceSample { baked, mixed, asked: true, hidden: !part.visible, inverse_distance }
+                SourceSample { baked, mixed, asked: true, hidden: !sampled.visible, inverse_distance }
             }
         }
     }
 
     /// Adds the mean irradiance of a receiver by so many samples; `point` maps the unit square onto its surface.
-    pub(crate) fn rest(
+    pub(crate) fn add_shared_light(
         &self,
-        rest: &Rest,
+        shared: &SharedSources,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) {
-        if rest.is_empty() {
+        if shared.is_empty() {
             return;
         }
         let per_sample = 1.0 / samples.max(1) as f32;
@@ -94,7 +101,7 @@ impl Sources<'_> {
             let [x, y, ..] = sequence.point(sample, PLACE_SET);
             let Some(receiver) = point(x, y) else { continue };
             let [choice, u, v, _] = sequence.point(sample, SOURCE_SET);
-            let found = self.sample(rest, &receiver, [choice, u, v]);
+            let found = self.sample(shared, &receiver, [choice, u, v]);
             direct.baked += found.baked * per_sample;
             direct.mixed += found.mixed * per_sample;
             batches[batch_of(sample, samples)] += found.baked.element_sum() / 3.0;

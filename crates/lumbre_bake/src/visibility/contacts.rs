@@ -1,5 +1,5 @@
 //! Contact lines: where other surfaces stand on a triangle or pass through it, and the outlines of what lies on it. Light differs from
-//! one side of such a line to the other, however small a patch is. Not the cutting of patches along them: that is `cuts`.
+//! one side of such a line to the other, however small a patch is. Not the cutting of patches along them: that is `bsp`.
 
 use std::collections::HashMap;
 

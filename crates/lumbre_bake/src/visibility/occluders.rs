@@ -8,7 +8,7 @@ use super::shaft::Corners;
 /// What is known of the ways from a receiver to the sources: of those that are not named rays have to tell.
 pub(crate) struct Visibility<'a> {
     /// Parts of the emissive surfaces.
-    pub parts: Vec<PartOccluders>,
+    pub lamps: Vec<LampOccluders>,
     /// Lights, by their numbers and in their order.
     pub lights: &'a [(u32, LightVisibility)],
     /// What the receiver shows, where shadows of lights may fall on it.
@@ -18,15 +18,15 @@ pub(crate) struct Visibility<'a> {
 }
 
 /// The triangles that may stand between a receiver and the emitters of one part of the sources: no others do.
-pub(crate) struct PartOccluders {
-    pub part: u32,
+pub(crate) struct LampOccluders {
+    pub node: u32,
     /// Those that shine on it; none where nothing stands before any of them.
     pub emitters: Vec<(u32, Vec<Corners>)>,
 }
 
 impl Visibility<'_> {
     /// Nothing is known.
-    pub const UNKNOWN: Self = Self { parts: Vec::new(), lights: &[], receiver_shape: None, square: None };
+    pub const UNKNOWN: Self = Self { lamps: Vec::new(), lights: &[], receiver_shape: None, square: None };
 
     /// What is known of a light, by its number.
     pub fn of_light(&self, light: u32) -> Option<&LightVisibility> {

@@ -43,7 +43,7 @@ pub(crate) fn lambert(normal: DVec3, corners: &[DVec3]) -> f64 {
             sum += sine.atan2(a.dot(b)) * normal.dot(cross) / sine;
         }
     }
-    // Seen from the front the corners run counter-clockwise about the direction to the eye, so clockwise about ours.
+    // VisibilitySummary from the front the corners run counter-clockwise about the direction to the eye, so clockwise about ours.
     -sum / TAU
 }
 

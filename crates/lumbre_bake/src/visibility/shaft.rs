@@ -67,7 +67,7 @@ pub(crate) fn is_free_before(area: &Area, scene: &BakeScene) -> bool {
             let (one, other) = (range(&points), range(&corners));
             other.0 >= one.1 - slack || other.1 <= one.0 + slack
         });
-        beside && looked_at <= MOST_LOOKED_AT
+        beside && looked_at <= MAX_LOOKED_AT
     })
 }
 
@@ -233,7 +233,7 @@ impl Shaft {
             if self.may_meet(&triangle.corners.map(|corner| corner.as_dvec3()), f64::from(triangle.extent)) {
                 found.push(index);
             }
-            looked_at <= MOST_LOOKED_AT && found.len() <= most
+            looked_at <= MAX_LOOKED_AT && found.len() <= most
         });
         let solid =
             |&index: &u32| !scene.surfaces[scene.triangles[index as usize].surface as usize].is_masked();
@@ -242,7 +242,7 @@ impl Shaft {
 }
 
 /// Most triangles that are looked at for one shaft, and that may stand in it: beyond, rays are quicker.
-const MOST_LOOKED_AT: usize = 512;
+const MAX_LOOKED_AT: usize = 512;
 
 #[cfg(test)]
 #[path = "shaft_tests.rs"]

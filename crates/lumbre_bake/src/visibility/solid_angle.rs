@@ -44,7 +44,7 @@ mod tests {
     fn its_sign_says_which_side_is_seen() {
         let corners = [DVec3::new(0.0, 1.0, 0.0), DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, 1.0, 1.0)];
         let [a, b, c] = corners;
-        // Seen from below they run counter-clockwise.
+        // VisibilitySummary from below they run counter-clockwise.
         assert!(of_triangle([a, b, c]) > 0.0 && of_triangle([a, c, b]) < 0.0);
     }
 }

@@ -36,7 +36,7 @@ fn source(i: u32) -> (DVec3, f64) {
 
 /// Sources, and the rays of a texel: far fewer than one to each.
 const COUNT: u32 = 400;
-const MOST_RAYS: u64 = 128;
+const MAX_RAYS: u64 = 128;
 
 fn judge(name: &str, world: &mut World, value: impl Fn(DVec3) -> f64) -> BakeReport {
     spawn_square(world, Vec3::ZERO, 4.0, true, 0.0);
@@ -73,7 +73,7 @@ fn hundreds_of_glowing_squares() {
         };
         (0..COUNT).map(source).map(of).sum()
     });
-    assert!(report.rays < MOST_RAYS * report.texels as u64, "{} rays", report.rays);
+    assert!(report.rays < MAX_RAYS * report.texels as u64, "{} rays", report.rays);
 }
 
 #[test]
@@ -87,5 +87,5 @@ fn hundreds_of_point_lights() {
         let of = |(place, bright): (DVec3, f64)| PI * 1e-3 * bright * place.y / (place - p).length().powi(3);
         (0..COUNT).map(source).map(of).sum()
     });
-    assert!(report.rays < MOST_RAYS * report.texels as u64, "{} rays", report.rays);
+    assert!(report.rays < MAX_RAYS * report.texels as u64, "{} rays", report.rays);
 }

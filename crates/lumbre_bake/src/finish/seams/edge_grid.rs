@@ -23,7 +23,7 @@ pub(crate) struct EdgeGrid<'a> {
 }
 
 /// Most edges that one is compared with: stacked copies of one object must not take quadratic time.
-const MOST_CANDIDATES: usize = 4096;
+const MAX_CANDIDATES: usize = 4096;
 
 impl<'a> EdgeGrid<'a> {
     pub fn new(edges: &'a [Edge], reach: f64) -> Self {
@@ -52,13 +52,13 @@ impl<'a> EdgeGrid<'a> {
         for (class, level) in self.levels.iter().filter(|(class, _)| *class >= own) {
             for cell in cells(edge, level.cell, self.reach) {
                 let there = level.cells.get(&cell).into_iter().flatten().copied();
-                found.extend(there.filter(|&other| *class > own || other < index).take(MOST_CANDIDATES));
+                found.extend(there.filter(|&other| *class > own || other < index).take(MAX_CANDIDATES));
             }
         }
         found.sort_unstable();
         found.dedup();
-        let crowded = found.len() >= MOST_CANDIDATES;
-        found.truncate(MOST_CANDIDATES);
+        let crowded = found.len() >= MAX_CANDIDATES;
+        found.truncate(MAX_CANDIDATES);
         (found, crowded)
     }
 }
@@ -117,9 +117,9 @@ mod tests {
         // Neighbours only: far from all pairs.
         assert!(pairs.len() < 100 + 2 * 100 * 4, "{}", pairs.len());
         // Too many in one place are told.
-        let stacked = vec![edges[0]; MOST_CANDIDATES + 2];
+        let stacked = vec![edges[0]; MAX_CANDIDATES + 2];
         let grid = EdgeGrid::new(&stacked, 1e-6);
-        let (found, crowded) = grid.near(MOST_CANDIDATES as u32 + 1);
-        assert!(crowded && found.len() == MOST_CANDIDATES && !grid.near(5).1);
+        let (found, crowded) = grid.near(MAX_CANDIDATES as u32 + 1);
+        assert!(crowded && found.len() == MAX_CANDIDATES && !grid.near(5).1);
     }
 }

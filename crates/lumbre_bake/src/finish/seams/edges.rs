@@ -28,7 +28,7 @@ pub(crate) fn borders(scene: &BakeScene) -> Vec<Edge> {
     let mut sides: Vec<([u32; 2], u32)> = Vec::new();
     for (index, triangle) in scene.triangles.iter().enumerate() {
         let [a, b, c] = triangle.uv;
-        if triangle.superseded || (b - a).perp_dot(c - a) == 0.0 || !(a + b + c).is_finite() {
+        if triangle.is_hidden_duplicate || (b - a).perp_dot(c - a) == 0.0 || !(a + b + c).is_finite() {
             continue;
         }
         let ids: [u32; 3] = std::array::from_fn(|corner| {

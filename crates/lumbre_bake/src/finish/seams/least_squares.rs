@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::samples::{Reading, Sample};
-use super::{Maps, NO_CHART, Shown};
+use super::{MapValues, Maps, NO_CHART};
 use crate::cancel_token::CancelToken;
 use crate::conjugate_gradients::{self, System};
 use crate::report::SeamReport;
@@ -30,7 +30,7 @@ const LIMIT: f64 = 2.0;
 const BESIDE: f64 = 4.0;
 /// Relative residual at which conjugate gradients end, and their most steps.
 const RESIDUAL: f64 = 1e-6;
-const MOST_STEPS: usize = 400;
+const MAX_STEPS: usize = 400;
 /// Times that texels at their limit are taken out and the others solved again.
 const ACTIVE_SETS: u32 = 6;
 
@@ -42,7 +42,7 @@ pub(crate) struct Patience {
 }
 
 impl Patience {
-    pub const WHOLE: Self = Self { steps: MOST_STEPS, active_sets: ACTIVE_SETS };
+    pub const WHOLE: Self = Self { steps: MAX_STEPS, active_sets: ACTIVE_SETS };
     /// When the time is up: a few steps close most of a jump, which is between texels that lie next to each other.
     pub const LATE: Self = Self { steps: 12, active_sets: 2 };
 }
@@ -63,7 +63,7 @@ struct Equation {
 }
 
 impl Unknowns {
-    pub fn new(maps: &Maps<'_>, charts: &[u32], shown: &Shown<'_>, samples: &[Sample]) -> Self {
+    pub fn new(maps: &Maps<'_>, charts: &[u32], shown: &MapValues<'_>, samples: &[Sample]) -> Self {
         let read = |side: &Reading| {
             let texels = side.texels.into_iter().zip(side.weights);
             texels.filter(|(_, weight)| *weight > 0.0).map(|(texel, _)| texel)
@@ -81,12 +81,12 @@ impl Unknowns {
     pub fn solve(
         &self,
         samples: &[Sample],
-        shown: Shown<'_>,
+        shown: MapValues<'_>,
         mean: f64,
         patience: Patience,
         stop: &CancelToken,
     ) -> SeamReport {
-        let Shown { light: filled, variances } = shown;
+        let MapValues { light: filled, variances } = shown;
         let equations: Vec<Equation> = samples.iter().map(|sample| self.equation(sample)).collect();
         let channels: Vec<(Vec<f64>, [f64; 2])> = (0..3usize)
             .into_par_iter()
@@ -167,8 +167,8 @@ fn squared_jump(equations: &[Equation], values: &[f64]) -> f64 {
 }
 
 /// How far each channel of a texel may be off, squared.
-fn variance(maps: &Maps<'_>, charts: &[u32], shown: &Shown<'_>, texel: MapTexel) -> DVec3 {
-    let Shown { light: filled, variances } = shown;
+fn variance(maps: &Maps<'_>, charts: &[u32], shown: &MapValues<'_>, texel: MapTexel) -> DVec3 {
+    let MapValues { light: filled, variances } = shown;
     let Some(map) = maps.layout.maps.iter().rev().find(|map| map.first <= texel.place()) else {
         return DVec3::ZERO;
     };

@@ -18,7 +18,7 @@ mod samples;
 use glam::Vec3;
 
 use crate::coverage::footprint::Texel;
-use crate::progress::Watch;
+use crate::monitor::BakeMonitor;
 use crate::report::SeamReport;
 use crate::scene::{BakeScene, LightmapLayout};
 use crate::{BakeError, BakeOptions, BakeReport};
@@ -35,7 +35,7 @@ pub(crate) struct Maps<'a> {
 }
 
 /// What the maps show, per texel of all.
-pub(crate) struct Shown<'a> {
+pub(crate) struct MapValues<'a> {
     /// Irradiance, W/m²; NaN where nothing is known.
     pub light: &'a mut [Vec3],
     /// Squared errors, mean of the channels; NaN where no surface is shown.
@@ -60,17 +60,17 @@ struct Closed {
 /// [`BakeError::Cancelled`].
 pub(crate) fn close_seams(
     maps: &Maps<'_>,
-    shown: Shown<'_>,
+    shown: MapValues<'_>,
     options: &BakeOptions,
-    watch: &mut Watch<'_>,
+    monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<(), BakeError> {
     if !options.seams {
         report.skipped.push("seams: switched off".into());
         return Ok(());
     }
-    let patience = if watch.clock().late() { Patience::LATE } else { Patience::WHOLE };
-    let closed = watch.during(0.0, || close(maps, shown, patience))?;
+    let patience = if monitor.clock().is_over() { Patience::LATE } else { Patience::WHOLE };
+    let closed = monitor.run_interruptible(0.0, || close(maps, shown, patience))?;
     report.rays += closed.rays;
     report.warnings.extend(closed.warning);
     match closed.report {
@@ -80,7 +80,7 @@ pub(crate) fn close_seams(
     Ok(())
 }
 
-fn close(maps: &Maps<'_>, shown: Shown<'_>, patience: Patience) -> Closed {
+fn close(maps: &Maps<'_>, shown: MapValues<'_>, patience: Patience) -> Closed {
     if maps.mean.is_nan() || maps.mean <= 0.0 {
         return Closed { report: Err("the maps are black"), rays: 0, warning: None };
     }

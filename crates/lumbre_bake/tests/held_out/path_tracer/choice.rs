@@ -35,13 +35,13 @@ pub struct ChoiceGrid {
 }
 
 /// Weights of all cells together, at most about.
-const MOST_WEIGHTS: f64 = 4e6;
+const MAX_WEIGHTS: f64 = 4e6;
 
 impl ChoiceGrid {
     /// For things of a place, a size and a power: power over squared distance, but nowhere nearer than the cell and the thing are large; a
     /// twentieth by power alone, so that nothing is left out.
     pub fn new([low, high]: [DVec3; 2], things: &[(DVec3, f64, f64)]) -> Self {
-        let side = (MOST_WEIGHTS / things.len().max(1) as f64).cbrt().clamp(1.0, 16.0) as usize;
+        let side = (MAX_WEIGHTS / things.len().max(1) as f64).cbrt().clamp(1.0, 16.0) as usize;
         let cell = ((high - low) / side as f64).max(DVec3::splat(1e-9));
         let total: f64 = things.iter().map(|(.., power)| power).sum();
         let choice = |index: usize| {

@@ -12,16 +12,16 @@ use rayon::prelude::*;
 use super::changed_box::ChangedBox;
 use super::changes::Changes;
 use super::choice;
+use super::direct_light_invalidation::ShadowVolumes;
 use super::estimate::{Estimate, Range, cap, in_cap};
-use super::relit::ShadowVolumes;
 use crate::chunks::in_chunks;
 use crate::coverage::blocks::Blocks;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Texel, receiver};
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
-use crate::final_gather::kept::Kept;
-use crate::progress::Watch;
+use crate::final_gather::reused_gather::ReusedGather;
+use crate::monitor::BakeMonitor;
 use crate::radiosity::exchange::Exchange;
 use crate::radiosity::form_factors::FormFactors;
 use crate::radiosity::patches::{Patch, Patches};
@@ -54,16 +54,17 @@ pub(crate) fn kept_bounces(
     direct: &DirectLight,
     (exchange, factors): (&Exchange, &FormFactors),
     options: &BakeOptions,
-    watch: &mut Watch<'_>,
-) -> Result<(Kept, u64), BakeError> {
-    let change = watch.during(1.0, || Change::new(sources, changes, texels, &direct.texels))?;
-    let of_patches = change.of_patches(exchange, factors, options, watch)?;
-    let kept = change.keep(exchange, &of_patches, &texels.list, &direct.local, options, watch)?;
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(ReusedGather, u64), BakeError> {
+    let change =
+        monitor.run_interruptible(1.0, || IndirectChange::new(sources, changes, texels, &direct.texels))?;
+    let of_patches = change.of_patches(exchange, factors, options, monitor)?;
+    let kept = change.keep(exchange, &of_patches, &texels.list, &direct.local, options, monitor)?;
     Ok((kept, change.rays(&of_patches)))
 }
 
 /// The light before and now, as far as it is needed to tell the difference.
-struct Change<'a> {
+struct IndirectChange<'a> {
     scene: &'a BakeScene,
     layout: &'a LightmapLayout,
     changes: &'a Changes<'a>,
@@ -89,7 +90,7 @@ struct PatchLight<'a> {
     unknown: &'a [bool],
 }
 
-impl<'a> Change<'a> {
+impl<'a> IndirectChange<'a> {
     /// From the direct light of every covered texel as it is now.
     fn new(
         sources: &Sources<'a>,
@@ -129,7 +130,7 @@ impl<'a> Change<'a> {
         exchange: &Exchange,
         factors: &FormFactors,
         options: &BakeOptions,
-        watch: &mut Watch<'_>,
+        monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<Range>, BakeError> {
         if self.changes.none {
             return Ok(Vec::new());
@@ -141,7 +142,7 @@ impl<'a> Change<'a> {
         let is_new = |patch: &Patch| {
             self.changes.changed[self.scene.triangles[patch.triangle as usize].object as usize]
         };
-        let first: Vec<(Vec3, Vec3)> = in_chunks(patches.list.len(), watch, |index| {
+        let first: Vec<(Vec3, Vec3)> = in_chunks(patches.list.len(), monitor, |index| {
             let patch = &patches.list[index];
             if is_new(patch) || patch.reflectance == Vec3::ZERO {
                 return (Vec3::ZERO, Vec3::ZERO);
@@ -175,7 +176,8 @@ impl<'a> Change<'a> {
             });
             more.iter().zip(&less).map(|(more, less)| more - less).collect::<Vec<f64>>()
         };
-        let solved: Vec<Vec<f64>> = watch.during(1.0, || (0..6usize).into_par_iter().map(job).collect())?;
+        let solved: Vec<Vec<f64>> =
+            monitor.run_interruptible(1.0, || (0..6usize).into_par_iter().map(job).collect())?;
         let of_patch = |which: usize, patch: usize| {
             let [red, green, blue] = [0, 1, 2].map(|channel| solved[3 * which + channel][patch]);
             bound(which, patch) + DVec3::new(red, green, blue).as_vec3()
@@ -201,15 +203,15 @@ impl<'a> Change<'a> {
         texels: &[Texel],
         local: &LocalLight,
         options: &BakeOptions,
-        watch: &mut Watch<'_>,
-    ) -> Result<Kept, BakeError> {
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<ReusedGather, BakeError> {
         if self.changes.none {
             return Ok(choice::all(self.changes));
         }
         let Exchange { patches, exitance, .. } = exchange;
         let unknown = self.unknown_backs(patches);
         let light = PatchLight { patches, exitance, change: of_patches, unknown: &unknown };
-        let change = self.of_texels(texels, light, options, watch)?;
+        let change = self.of_texels(texels, light, options, monitor)?;
         Ok(choice::choose(self.changes, texels, &change, local, options.error))
     }
 
@@ -220,9 +222,9 @@ impl<'a> Change<'a> {
         texels: &[Texel],
         light: PatchLight<'_>,
         options: &BakeOptions,
-        watch: &mut Watch<'_>,
+        monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<f32>, BakeError> {
-        let found = in_chunks(self.blocks.members.len(), watch, |block| {
+        let found = in_chunks(self.blocks.members.len(), monitor, |block| {
             let members: Vec<&Texel> =
                 self.blocks.members[block].iter().map(|&member| &texels[member as usize]).collect();
             if members.is_empty() {

@@ -29,7 +29,7 @@ impl Weights {
 
 /// What a texel has gathered: irradiance by bounces.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Gathered {
+pub(crate) struct GatherSums {
     /// Sum of the samples of each replicate.
     pub sums: [Vec3; REPLICATES],
     /// What tells how far their weights alone made them so.
@@ -53,13 +53,13 @@ pub(crate) struct Gathered {
 }
 
 /// Variance of weights below which they are all the same.
-const LEAST_SPREAD: f32 = 1e-4;
+const MIN_SPREAD: f32 = 1e-4;
 /// Samples below which nothing can be said about how light depends on their weights: a line through three explains most of what differs by chance.
 const ENOUGH: f32 = 9.0;
 /// Share of the light's variance that goes with the weights where they are taken out.
 const EXPLAINED: f32 = 0.6;
 
-impl Gathered {
+impl GatherSums {
     /// The estimate of each replicate.
     pub fn estimates(&self) -> [Vec3; REPLICATES] {
         if self.samples == 0 {
@@ -84,7 +84,7 @@ impl Gathered {
             // From few samples the slope is noise itself: it has to explain most of what differs.
             let explained = grey(together).powi(2) > EXPLAINED * spread * light_spread;
             let slope = together / spread;
-            let known = all >= ENOUGH && spread > LEAST_SPREAD * all && explained && slope.is_finite();
+            let known = all >= ENOUGH && spread > MIN_SPREAD * all && explained && slope.is_finite();
             let slope = if known { slope } else { Vec3::ZERO };
             self.sums[own] / count - slope * (self.weights[own].sum / count - 1.0)
         })

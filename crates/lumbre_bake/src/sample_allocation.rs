@@ -10,7 +10,7 @@ use crate::texel_index::CoveredTexel;
 
 /// A texel that is to have more samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Allotment {
+pub(crate) struct SampleAllocation {
     pub texel: CoveredTexel,
     /// In all, with those that it has.
     pub samples: u32,
@@ -19,7 +19,7 @@ pub(crate) struct Allotment {
 /// Texels that are summed up together.
 const CHUNK: usize = 4096;
 /// Most that one round doubles the samples: a variance from few is not to be trusted further.
-const MOST_DOUBLINGS: usize = 3;
+const MAX_DOUBLINGS: usize = 3;
 /// What a sample must at least be worth is sought by this factor, down to this share of the highest, and then by so many halvings.
 const FACTOR: f64 = 4.0;
 const LEAST: f64 = 1e-9;
@@ -27,14 +27,14 @@ const HALVINGS: u32 = 6;
 
 /// The samples that bring the sum of variances down to `goal`, each texel's to at most `most`, by powers of two; all that can be had if that
 /// does not suffice. `variances` and `samples` are those of the covered texels; `order` is that of the variance's fall with the samples.
-pub(crate) fn allot(
+pub(crate) fn allocate(
     texels: impl Iterator<Item = CoveredTexel> + Clone,
     variances: &[f32],
     samples: &[u32],
     most: u32,
     order: f64,
     goal: f64,
-) -> Vec<Allotment> {
+) -> Vec<SampleAllocation> {
     // With k times the samples, each is worth 1 / k^(1 + p) of what it was, and k^-p of the variance is left.
     let powers = |exponent: f64| [1.0, 2.0, 4.0, 8.0].map(|factor: f64| factor.powf(exponent));
     let (devalued, remaining) = (powers(1.0 + order), powers(-order));
@@ -44,7 +44,7 @@ pub(crate) fn allot(
     let doublings = |texel: CoveredTexel, least_worth: f64| {
         let (own, worth) = (samples[texel.place()].max(1), worth(texel));
         let mut doublings = 0;
-        while doublings < MOST_DOUBLINGS
+        while doublings < MAX_DOUBLINGS
             && own << doublings < most
             && worth > least_worth * devalued[doublings]
         {
@@ -84,12 +84,12 @@ pub(crate) fn allot(
         let own = samples[texel.place()].max(1);
         (own << doublings(texel, least_worth)).min(most.max(own))
     };
-    let more = |texel: CoveredTexel| Allotment { texel, samples: wanted(texel) };
+    let more = |texel: CoveredTexel| SampleAllocation { texel, samples: wanted(texel) };
     texels.map(more).filter(|own| own.samples > samples[own.texel.place()]).collect()
 }
 
-/// As [`allot`], of at most `budget` more samples: what is left over the goal is then as little as they can make it.
-pub(crate) fn allot_within(
+/// As [`allocate`], of at most `budget` more samples: what is left over the goal is then as little as they can make it.
+pub(crate) fn allocate_within(
     budget: u64,
     texels: impl Iterator<Item = CoveredTexel> + Clone,
     variances: &[f32],
@@ -97,11 +97,11 @@ pub(crate) fn allot_within(
     most: u32,
     order: f64,
     mut goal: f64,
-) -> Vec<Allotment> {
+) -> Vec<SampleAllocation> {
     let left: f64 = texels.clone().map(|texel| f64::from(variances[texel.place()])).sum();
     loop {
-        let wanted = allot(texels.clone(), variances, samples, most, order, goal);
-        let more = |own: &Allotment| u64::from(own.samples - samples[own.texel.place()]);
+        let wanted = allocate(texels.clone(), variances, samples, most, order, goal);
+        let more = |own: &SampleAllocation| u64::from(own.samples - samples[own.texel.place()]);
         if wanted.iter().map(more).sum::<u64>() <= budget {
             return wanted;
         }
@@ -123,12 +123,13 @@ mod tests {
     fn the_goal_is_reached_with_rays_where_they_are_worth_most() {
         let variances = [16.0f32, 1.0, 0.01, 0.0];
         let samples = [4, 4, 4, 4];
-        let allotted = allot(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0);
+        let allocated = allocate(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0);
         // 16 to 4 brings 17.01 down to 5.01; the second's samples are worth a sixteenth of the first's.
-        assert_eq!(allotted, [Allotment { texel: CoveredTexel(0), samples: 16 }]);
+        assert_eq!(allocated, [SampleAllocation { texel: CoveredTexel(0), samples: 16 }]);
         let total: f32 = variances.iter().sum();
         assert!(
-            allot(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, f64::from(total) * 1.01).is_empty()
+            allocate(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, f64::from(total) * 1.01)
+                .is_empty()
         );
     }
 
@@ -137,23 +138,23 @@ mod tests {
         let variances = [16.0f32, 1.0, 0.01, 0.0];
         let samples = [4, 4, 4, 4];
         // The goal alone would take far more than these.
-        let allotted = allot_within(12, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 1e-3);
-        assert_eq!(allotted, [Allotment { texel: CoveredTexel(0), samples: 16 }]);
-        assert!(allot_within(3, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 1e-3).is_empty());
-        let plenty = allot_within(1 << 20, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0);
-        assert_eq!(plenty, allot(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0));
+        let allocated = allocate_within(12, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 1e-3);
+        assert_eq!(allocated, [SampleAllocation { texel: CoveredTexel(0), samples: 16 }]);
+        assert!(allocate_within(3, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 1e-3).is_empty());
+        let plenty = allocate_within(1 << 20, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0);
+        assert_eq!(plenty, allocate(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0));
     }
 
     #[test]
     fn a_goal_out_of_reach_takes_all_there_is_and_ends() {
-        let allotted = allot(CoveredTexel::all(3), &[1.0, 2.0, 0.0], &[4, 8, 4], 16, 1.0, 0.0);
+        let allocated = allocate(CoveredTexel::all(3), &[1.0, 2.0, 0.0], &[4, 8, 4], 16, 1.0, 0.0);
         assert_eq!(
-            allotted,
+            allocated,
             [
-                Allotment { texel: CoveredTexel(0), samples: 16 },
-                Allotment { texel: CoveredTexel(1), samples: 16 }
+                SampleAllocation { texel: CoveredTexel(0), samples: 16 },
+                SampleAllocation { texel: CoveredTexel(1), samples: 16 }
             ]
         );
-        assert!(allot(CoveredTexel::all(1), &[f32::MIN_POSITIVE], &[16], 16, 1.0, 0.0).is_empty());
+        assert!(allocate(CoveredTexel::all(1), &[f32::MIN_POSITIVE], &[16], 16, 1.0, 0.0).is_empty());
     }
 }

@@ -17,13 +17,13 @@ const MAGIC: &[u8; 8] = b"LUMBRECP";
 const CHECKSUM: usize = 32;
 const HEADER: usize = 8 + 4 + 32 + CHECKSUM;
 /// More than this does not wait for the interval.
-const MOST_PENDING: usize = 64 << 20;
+const MAX_PENDING: usize = 64 << 20;
 /// Writing may take one part in so many of the time.
 const SHARE: u32 = 20;
 
 /// Which values of which list a block holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Place {
+pub(crate) struct ChunkKey {
     /// The stage, by its place in the order.
     pub stage: u8,
     /// Values of the whole list.
@@ -34,15 +34,15 @@ pub(crate) struct Place {
 
 /// What a bake has computed so far, in a file.
 #[derive(Default)]
-pub(crate) struct Tape {
-    open: Option<OpenTape>,
+pub(crate) struct CheckpointFile {
+    open: Option<OpenCheckpoint>,
     /// What the user should know, once each.
     pub warnings: Vec<String>,
     /// Seconds of work that were taken from the file.
     pub resumed: f64,
 }
 
-struct OpenTape {
+struct OpenCheckpoint {
     file: File,
     path: PathBuf,
     /// End of what is read or written, in the file.
@@ -55,11 +55,11 @@ struct OpenTape {
     written: Instant,
 }
 
-impl Tape {
+impl CheckpointFile {
     /// Opens or begins a checkpoint.
     pub fn open(checkpoint: &Checkpoint, identity: &ContentHash) -> Result<Self, CheckpointError> {
         let path = &checkpoint.path;
-        let mut tape = Self::default();
+        let mut opened = Self::default();
         let found = match std::fs::symlink_metadata(path) {
             Ok(_) => Some(open_existing(path)?),
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
@@ -67,13 +67,13 @@ impl Tape {
         };
         let kept = match found {
             None if checkpoint.resume => {
-                tape.warn(path, "there is no such checkpoint: baking from the start");
+                opened.warn(path, "there is no such checkpoint: baking from the start");
                 None
             }
             Some((file, length)) if checkpoint.resume => match read_header(file, identity) {
                 Ok((file, chain)) => Some((file, length, chain)),
                 Err(why) => {
-                    tape.warn(path, &format!("{why}: baking from the start"));
+                    opened.warn(path, &format!("{why}: baking from the start"));
                     None
                 }
             },
@@ -86,7 +86,7 @@ impl Tape {
                 (file, None, chain)
             }
         };
-        tape.open = Some(OpenTape {
+        opened.open = Some(OpenCheckpoint {
             file,
             path: path.clone(),
             end: HEADER as u64,
@@ -96,7 +96,7 @@ impl Tape {
             interval: checkpoint.interval,
             written: Instant::now(),
         });
-        Ok(tape)
+        Ok(opened)
     }
 
     fn warn(&mut self, path: &Path, what: &str) {
@@ -104,10 +104,10 @@ impl Tape {
     }
 
     /// The values that come next, if the file has them, and the seconds they had taken. An empty list: the time ran out here.
-    pub fn next<T: Record>(&mut self, place: Place) -> Option<(Vec<T>, f64)> {
+    pub fn next<T: Record>(&mut self, key: ChunkKey) -> Option<(Vec<T>, f64)> {
         let open = self.open.as_mut()?;
         let length = open.reading?;
-        match open.read_block(length, place) {
+        match open.read_block(length, key) {
             Ok(Some((values, seconds))) => {
                 self.resumed = seconds;
                 Some((values, seconds))
@@ -136,18 +136,18 @@ impl Tape {
     }
 
     /// Appends values. They reach the file when the interval is over.
-    pub fn record<T: Record>(&mut self, place: Place, values: &[T], seconds: f64) {
+    pub fn record<T: Record>(&mut self, key: ChunkKey, values: &[T], seconds: f64) {
         let Some(open) = &mut self.open else { return };
         if open.reading.take().is_some() {
             // The list was not asked for in chunks from its start: what is left in the file is of no use.
             self.cut();
         }
         let Some(open) = &mut self.open else { return };
-        match record::written(&(place, seconds, values)) {
+        match record::written(&(key, seconds, values)) {
             Ok(content) => open.append(&content),
             Err(error) => return self.give_up(&io::Error::other(error)),
         }
-        if open.pending.len() > MOST_PENDING || open.written.elapsed() >= open.interval {
+        if open.pending.len() > MAX_PENDING || open.written.elapsed() >= open.interval {
             self.flush();
         }
     }
@@ -178,12 +178,12 @@ impl Tape {
     }
 }
 
-impl OpenTape {
+impl OpenCheckpoint {
     /// `Ok(None)` at the end of the file.
     fn read_block<T: Record>(
         &mut self,
         length: u64,
-        place: Place,
+        key: ChunkKey,
     ) -> Result<Option<(Vec<T>, f64)>, &'static str> {
         const CUT: &str = "its last block is cut short";
         const DAMAGED: &str = "it is damaged: a checksum is wrong";
@@ -212,8 +212,8 @@ impl OpenTape {
         if chain != checksum {
             return Err(DAMAGED);
         }
-        let (at, seconds, values): (Place, f64, Vec<T>) = record::read(&content).ok_or(OTHER)?;
-        let fits = at == place && values.len() <= place.of - place.start;
+        let (at, seconds, values): (ChunkKey, f64, Vec<T>) = record::read(&content).ok_or(OTHER)?;
+        let fits = at == key && values.len() <= key.of - key.start;
         if !(fits && seconds.is_finite() && seconds >= 0.0) {
             return Err(OTHER);
         }

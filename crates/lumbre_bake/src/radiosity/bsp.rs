@@ -1,4 +1,4 @@
-//! Cuts a cell of a triangle along contact lines into smaller triangles, and finds the one that a point lies in: a tree of lines
+//! BspTrees a cell of a triangle along contact lines into smaller triangles, and finds the one that a point lies in: a tree of lines
 //! (Fuchs, Kedem, Naylor, "On Visible Surface Generation by A Priori Tree Structures", 1980). A cell that a wall crosses would else
 //! carry light from one side of it to the other. Not where the lines are: that is `contacts`.
 
@@ -8,15 +8,15 @@ use crate::visibility::clipping::{clip, clip_segment};
 
 /// One line and what lies on its sides.
 #[derive(Clone, Copy, Debug)]
-struct Node {
+struct BspNode {
     /// a u + b v + c, in barycentric weights of the second and third vertex, is at least 0 on the first side.
     line: [f32; 3],
-    sides: [Side; 2],
+    sides: [BspChild; 2],
 }
 
 /// A node or, marked by the highest bit, the slot of a piece.
 #[derive(Clone, Copy, Debug)]
-struct Side(u32);
+struct BspChild(u32);
 
 const PIECE: u32 = 1 << 31;
 
@@ -25,8 +25,8 @@ pub(crate) type Corners = [(f32, f32); 3];
 
 /// The cut cells of all triangles.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Cuts {
-    nodes: Vec<Node>,
+pub(crate) struct BspTrees {
+    nodes: Vec<BspNode>,
     /// The pieces, cell by cell.
     pub pieces: Vec<Corners>,
     /// Cells that more lines cross than cut them.
@@ -44,7 +44,7 @@ pub(crate) struct CutCell {
 }
 
 /// Lines that cut one cell, at most.
-const MOST_LINES: u32 = 12;
+const MAX_LINES: u32 = 12;
 /// Smallest part of a cell that is worth a piece of its own.
 const SMALLEST: f64 = 1.0 / 256.0;
 /// Contact lines as long as this share of a piece's size cut it.
@@ -57,7 +57,7 @@ const SLIVER: f64 = 1e-4;
 
 /// A cell while it is being cut.
 struct Cell<'a> {
-    cuts: &'a mut Cuts,
+    cuts: &'a mut BspTrees,
     /// What a unit right and up in the plane's frame adds to the barycentric weights, which are 0 at its origin.
     weights: DMat2,
     /// The first piece, and the slots of that and of those after it.
@@ -70,8 +70,8 @@ struct Cell<'a> {
     full: bool,
 }
 
-impl Cuts {
-    /// Cuts a cell, counter-clockwise in its plane's frame, along segments. `weights` turns places of the frame into barycentric weights.
+impl BspTrees {
+    /// BspTrees a cell, counter-clockwise in its plane's frame, along segments. `weights` turns places of the frame into barycentric weights.
     /// The first piece takes the slot `own`, the others those from `free` on. `None` if nothing cuts it.
     pub fn cut(
         &mut self,
@@ -82,7 +82,7 @@ impl Cuts {
     ) -> Option<CutCell> {
         let smallest = SMALLEST * area(&corners);
         let (root, first) = (self.nodes.len() as u32, self.pieces.len() as u32);
-        let (slots, left) = ((own, free), MOST_LINES);
+        let (slots, left) = ((own, free), MAX_LINES);
         let mut cell = Cell { cuts: self, weights, first, slots, smallest, left, full: false };
         let line = cell.best_line(&corners, segments)?;
         cell.divide(&corners, segments, Some(line));
@@ -93,7 +93,7 @@ impl Cuts {
 
     /// The slot of the piece of a cell in which a point lies.
     pub fn find(&self, root: u32, u: f32, v: f32) -> u32 {
-        let mut at = Side(root);
+        let mut at = BspChild(root);
         while at.0 & PIECE == 0 {
             let node = &self.nodes[at.0 as usize];
             let [a, b, c] = node.line;
@@ -105,7 +105,7 @@ impl Cuts {
 
 impl Cell<'_> {
     /// Divides a convex polygon by a line, if there is one, or else along contacts, or else into triangles.
-    fn divide(&mut self, polygon: &[DVec2], segments: &[[DVec2; 2]], line: Option<Line>) -> Side {
+    fn divide(&mut self, polygon: &[DVec2], segments: &[[DVec2; 2]], line: Option<Line>) -> BspChild {
         let Some(line) = line.or_else(|| self.best_line(polygon, segments)) else {
             return self.triangles(polygon);
         };
@@ -123,7 +123,7 @@ impl Cell<'_> {
             let child = self.divide(&part, &rest, None);
             self.cuts.nodes[node as usize].sides[side] = child;
         }
-        Side(node)
+        BspChild(node)
     }
 
     /// A node without sides yet.
@@ -137,12 +137,12 @@ impl Cell<'_> {
         let normal = if normal.dot(self.weights * line.normal) < 0.0 { -normal } else { normal };
         let line = [normal.x as f32, normal.y as f32, -normal.dot(p) as f32];
         let node = self.cuts.nodes.len() as u32;
-        self.cuts.nodes.push(Node { line, sides: [Side(PIECE); 2] });
+        self.cuts.nodes.push(BspNode { line, sides: [BspChild(PIECE); 2] });
         node
     }
 
     /// A convex polygon as a fan of triangles, about the corner that makes the smallest of them largest.
-    fn triangles(&mut self, polygon: &[DVec2]) -> Side {
+    fn triangles(&mut self, polygon: &[DVec2]) -> BspChild {
         let polygon = without_slivers(polygon);
         let count = polygon.len();
         let corner = |i: usize| polygon[i % count];
@@ -155,21 +155,21 @@ impl Cell<'_> {
         self.fan(&triangles)
     }
 
-    fn fan(&mut self, triangles: &[[DVec2; 3]]) -> Side {
-        let [own, rest @ ..] = triangles else { return Side(PIECE) };
+    fn fan(&mut self, triangles: &[[DVec2; 3]]) -> BspChild {
+        let [own, rest @ ..] = triangles else { return BspChild(PIECE) };
         if rest.is_empty() {
             let piece = own.map(|p| self.weights * p).map(|w| (w.x as f32, w.y as f32));
             let place = self.cuts.pieces.len() as u32 - self.first;
             self.cuts.pieces.push(piece);
             let slot = if place == 0 { self.slots.0 } else { self.slots.1 + place - 1 };
-            return Side(PIECE | slot);
+            return BspChild(PIECE | slot);
         }
         // The diagonal from the apex has this triangle on its right.
         let node = self.node(Line::through(own[2], own[0]));
         let first = self.fan(std::slice::from_ref(own));
         let second = self.fan(rest);
         self.cuts.nodes[node as usize].sides = [first, second];
-        Side(node)
+        BspChild(node)
     }
 
     /// The line along which most contacts lie, if they are long enough and leave a piece on each side.
@@ -266,8 +266,8 @@ mod tests {
         f64::from((b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1))
     }
 
-    fn cut(segments: &[[DVec2; 2]]) -> (Cuts, Option<CutCell>) {
-        let mut cuts = Cuts::default();
+    fn cut(segments: &[[DVec2; 2]]) -> (BspTrees, Option<CutCell>) {
+        let mut cuts = BspTrees::default();
         let weights = DMat2::from_diagonal(DVec2::splat(0.5));
         let cell = cuts.cut(CELL, segments, weights, (7, 100));
         (cuts, cell)
@@ -333,7 +333,7 @@ mod tests {
         let other = segment([0.005634784698486328, 0.03208932280540466], [0.015625, 0.0234375]);
         let weights = DMat2::from_diagonal(DVec2::splat(25.6));
         for segments in [vec![foot, other], vec![other, foot], vec![foot], vec![other]] {
-            let mut cuts = Cuts::default();
+            let mut cuts = BspTrees::default();
             if cuts.cut(corners, &segments, weights, (0, 1)).is_none() {
                 continue;
             }
@@ -352,10 +352,10 @@ mod tests {
                 .map(|x| segment([x, -1.0], [x, 3.0]))
                 .collect()
         };
-        for (count, full) in [(MOST_LINES, 0), (MOST_LINES + 1, 1)] {
+        for (count, full) in [(MAX_LINES, 0), (MAX_LINES + 1, 1)] {
             let (cuts, cell) = cut(&lines(count));
             assert!(
-                cell.is_some_and(|cell| cell.count > MOST_LINES) && cuts.full == full,
+                cell.is_some_and(|cell| cell.count > MAX_LINES) && cuts.full == full,
                 "{count}: {}",
                 cuts.full
             );

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use crate::coverage::footprint::Texel;
 use crate::denoise::replicates::{REPLICATES, mean, variance};
-use crate::final_gather::gathered::Gathered;
+use crate::final_gather::gather_sums::GatherSums;
 use crate::final_gather::radiance_cache::RadianceCache;
 use crate::scene::material::Side;
 
@@ -16,7 +16,7 @@ const FEW: u32 = 3;
 
 /// Gives every texel that has gathered nothing, or nothing but darkness from few rays, the irradiance of its patch. Its error is by as much as
 /// patches are off where texels did gather, relative to the light, and all of it where too few did.
-pub(crate) fn from_patches(cache: &RadianceCache<'_>, texels: &[Texel], gathered: &mut [Gathered]) {
+pub(crate) fn from_patches(cache: &RadianceCache<'_>, texels: &[Texel], gathered: &mut [GatherSums]) {
     let of_patch = |texel: &Texel| -> Vec3 {
         let Some(point) = texel.point(cache.scene, 0.5, 0.5) else { return Vec3::ZERO };
         let patch = cache.patches.at(point.triangle, Side::Front, point.at);
@@ -34,17 +34,18 @@ pub(crate) fn from_patches(cache: &RadianceCache<'_>, texels: &[Texel], gathered
         count += 1;
     }
     let off = if count >= ENOUGH && all > 0.0 { (apart.max(0.0) / all).sqrt().min(1.0) } else { 1.0 };
-    let knows_nothing = |own: &Gathered| own.samples <= FEW && own.sums.iter().all(|sum| *sum == Vec3::ZERO);
+    let knows_nothing =
+        |own: &GatherSums| own.samples <= FEW && own.sums.iter().all(|sum| *sum == Vec3::ZERO);
     for (texel, own) in
         texels.iter().zip(gathered).filter(|(texel, own)| knows_nothing(own) && !texel.is_hidden())
     {
         let light = of_patch(texel);
-        *own = Gathered {
+        *own = GatherSums {
             sums: [light; REPLICATES],
             samples: 1,
             rays: own.rays,
             patch_errors: Vec2::X * REPLICATES as f32 * (off * grey(light)) as f32,
-            ..Gathered::default()
+            ..GatherSums::default()
         };
     }
 }

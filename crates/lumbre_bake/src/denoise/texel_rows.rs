@@ -19,7 +19,7 @@ pub(crate) const BESIDE_A_ROW: usize = MARGIN + LANES - 1;
 pub(crate) const WINDOW: usize = MARGIN + LANES + MARGIN;
 
 /// Where the rows of all maps begin, and which of their texels are covered.
-pub(crate) struct Grid {
+pub(crate) struct TexelRows {
     pub rows: Vec<MapRow>,
     /// First columns of the blocks of all rows.
     pub blocks: Vec<u32>,
@@ -47,11 +47,11 @@ pub(crate) struct MapRow {
 }
 
 /// `N` numbers of each cell, row by row: a row of the first, a row of the second, and so on. Zero where no texel is.
-pub(crate) struct Strips<const N: usize> {
+pub(crate) struct ChannelRows<const N: usize> {
     pub values: Vec<f32>,
 }
 
-impl Grid {
+impl TexelRows {
     /// Of maps of these widths and heights, and the surface of each of their texels, [`NONE`] if it counts nowhere.
     pub fn new(
         sizes: impl Iterator<Item = (u32, u32)>,
@@ -82,7 +82,7 @@ impl Grid {
     }
 
     /// Numbers of each covered texel, which is told by its row (of all maps) and column.
-    pub fn fill<const N: usize>(&self, of: impl Fn(usize, usize) -> [f32; N] + Sync) -> Strips<N> {
+    pub fn fill<const N: usize>(&self, of: impl Fn(usize, usize) -> [f32; N] + Sync) -> ChannelRows<N> {
         let mut strips = self.strips();
         self.by_rows(&mut strips, |index, strip| {
             let row = &self.rows[index];
@@ -97,12 +97,16 @@ impl Grid {
     }
 
     /// Zero everywhere.
-    pub fn strips<const N: usize>(&self) -> Strips<N> {
-        Strips { values: vec![0.0; N * self.cells + MARGIN] }
+    pub fn strips<const N: usize>(&self) -> ChannelRows<N> {
+        ChannelRows { values: vec![0.0; N * self.cells + MARGIN] }
     }
 
     /// Writes every row's strips, each for itself.
-    pub fn by_rows<const N: usize>(&self, strips: &mut Strips<N>, write: impl Fn(usize, &mut [f32]) + Sync) {
+    pub fn by_rows<const N: usize>(
+        &self,
+        strips: &mut ChannelRows<N>,
+        write: impl Fn(usize, &mut [f32]) + Sync,
+    ) {
         let mut rest = &mut strips.values[..];
         let mut rows = Vec::with_capacity(self.rows.len());
         for row in &self.rows {
@@ -115,7 +119,7 @@ impl Grid {
     }
 
     /// What the strips hold of a texel.
-    pub fn get<const N: usize>(&self, strips: &Strips<N>, row: usize, column: usize) -> [f32; N] {
+    pub fn get<const N: usize>(&self, strips: &ChannelRows<N>, row: usize, column: usize) -> [f32; N] {
         let row = &self.rows[row];
         let first = N * row.start + MARGIN + column;
         std::array::from_fn(|channel| strips.values[first + channel * row.stride])

@@ -30,7 +30,7 @@ pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(MapTex
 }
 
 /// Of the texels that lines cross, those that they divide, in the order of the maps.
-pub(crate) fn straddling(
+pub(crate) fn divided_texels(
     layout: &LightmapLayout,
     texels: &[Texel],
     crossed: &[(MapTexel, [DVec2; 2])],
@@ -55,7 +55,7 @@ fn divisions(scene: &BakeScene, layout: &LightmapLayout, index: usize) -> Vec<(M
     let map = &layout.maps[triangle.object as usize];
     let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
     let texels = (b - a).perp_dot(c - a).abs();
-    if triangle.superseded || scene.stop.is_cancelled() || !(texels.is_finite() && texels > 2.0) {
+    if triangle.is_hidden_duplicate || scene.stop.is_cancelled() || !(texels.is_finite() && texels > 2.0) {
         return Vec::new();
     }
     let side = (2.0 * f64::from(triangle.area) / texels).sqrt();

@@ -5,24 +5,24 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::lanes::{Grid, Strips};
-use super::neighbours::BoxSums;
+use super::box_sums::BoxSums;
+use super::texel_rows::{ChannelRows, TexelRows};
 use crate::coverage::footprint::Texel;
 use crate::scene::{BakeScene, LightmapLayout};
 
 /// Who lies around whom.
-pub(crate) struct Surroundings<'a> {
+pub(crate) struct Neighbourhoods<'a> {
     scene: &'a BakeScene,
     pub texels: &'a [Texel],
     /// Of each texel of all maps, its place among the covered ones; [`NONE`] if it shows nothing in the open.
     places: Vec<u32>,
-    grid: Grid,
+    grid: TexelRows,
     /// Of each map, its first row in the grid; and of each row there, its first texel of all maps.
     first_rows: Vec<usize>,
     firsts: Vec<usize>,
 }
 
-impl<'a> Surroundings<'a> {
+impl<'a> Neighbourhoods<'a> {
     /// Texels of different groups are not compared with each other; an empty list has all in one.
     pub fn new(
         scene: &'a BakeScene,
@@ -48,7 +48,7 @@ impl<'a> Surroundings<'a> {
             ground[texel.index.place()] = surface;
         }
         let sizes = layout.maps.iter().map(|map| (map.width, map.height));
-        let mut grid = Grid::new(sizes, ground.into_iter(), surfaces);
+        let mut grid = TexelRows::new(sizes, ground.into_iter(), surfaces);
         grid.stop = scene.stop.clone();
         let (mut first_rows, mut firsts) = (Vec::new(), Vec::new());
         for map in &layout.maps {
@@ -64,12 +64,12 @@ impl<'a> Surroundings<'a> {
     }
 
     /// The texels in rows.
-    pub fn grid(&self) -> &Grid {
+    pub fn grid(&self) -> &TexelRows {
         &self.grid
     }
 
     /// Numbers of each covered texel, by its place in the list of them.
-    pub fn fill<const N: usize>(&self, of: impl Fn(usize) -> [f32; N] + Sync) -> Strips<N> {
+    pub fn fill<const N: usize>(&self, of: impl Fn(usize) -> [f32; N] + Sync) -> ChannelRows<N> {
         self.grid.fill(|row, column| of(self.places[self.firsts[row] + column] as usize))
     }
 
@@ -86,7 +86,7 @@ impl<'a> Surroundings<'a> {
     }
 
     /// What strips hold of each texel, zero of a hidden one.
-    pub fn read<const N: usize>(&self, strips: &Strips<N>) -> Vec<[f32; N]> {
+    pub fn read<const N: usize>(&self, strips: &ChannelRows<N>) -> Vec<[f32; N]> {
         let of = |texel: &Texel| {
             let row = self.first_rows[texel.object as usize] + texel.y as usize;
             if texel.is_hidden() { [0.0; N] } else { self.grid.get(strips, row, texel.x as usize) }

@@ -5,8 +5,8 @@ use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::cancel_token::CancelToken;
-use crate::checkpoint::tape::Place;
-use crate::checkpoint::{Record, Tape};
+use crate::checkpoint::checkpoint_file::ChunkKey;
+use crate::checkpoint::{CheckpointFile, Record};
 use crate::{BakeError, BakeReport, StageTime};
 
 /// How far a bake has come.
@@ -114,17 +114,17 @@ impl Clock {
 
     /// Whether more than a share of the time is gone. Never, without a limit.
     pub fn is_past(&self, share: f64) -> bool {
-        self.until(share).late()
+        self.until(share).is_over()
     }
 
     /// Whether the time is up.
-    pub fn late(&self) -> bool {
+    pub fn is_over(&self) -> bool {
         self.limit.is_some_and(|limit| self.seconds() >= limit.as_secs_f64())
     }
 }
 
 /// Reports to the caller, notes the time of each stage, and keeps what was computed.
-pub(crate) struct Watch<'a> {
+pub(crate) struct BakeMonitor<'a> {
     callback: &'a mut Callback<'a>,
     clock: Clock,
     is_cut_short: bool,
@@ -133,14 +133,23 @@ pub(crate) struct Watch<'a> {
     part: (f32, f32),
     error: Option<f64>,
     stop: CancelToken,
-    pub tape: Tape,
+    pub checkpoint: CheckpointFile,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> BakeMonitor<'a> {
     pub fn new(callback: &'a mut Callback<'a>, limit: Option<Duration>) -> Self {
         let clock = Clock { begun: Instant::now(), before: 0.0, limit };
-        let (stop, tape) = (CancelToken::default(), Tape::default());
-        Self { callback, clock, stage: None, part: (0.0, 1.0), error: None, is_cut_short: false, stop, tape }
+        let (stop, checkpoint) = (CancelToken::default(), CheckpointFile::default());
+        Self {
+            callback,
+            clock,
+            stage: None,
+            part: (0.0, 1.0),
+            error: None,
+            is_cut_short: false,
+            stop,
+            checkpoint,
+        }
     }
 
     /// Ends when this token is cancelled, too.
@@ -148,7 +157,7 @@ impl<'a> Watch<'a> {
         Self { stop, ..self }
     }
 
-    /// What loops look at while [`Watch::during`] waits for them.
+    /// What loops look at while [`BakeMonitor::run_interruptible`] waits for them.
     pub fn stop(&self) -> &CancelToken {
         &self.stop
     }
@@ -160,7 +169,7 @@ impl<'a> Watch<'a> {
 
     /// Whether anything was left out for want of time so far, or would be now.
     pub fn is_late(&self) -> bool {
-        self.is_cut_short || self.clock().late()
+        self.is_cut_short || self.clock().is_over()
     }
 
     /// The estimated error so far, for the caller.
@@ -215,11 +224,15 @@ impl<'a> Watch<'a> {
     }
 
     /// Does something that may take long, from a fraction of the running stage or its pass on. Meanwhile the caller is asked again and again, from a thread of its own,
-    /// whether to go on; if not, the work finds [`Watch::stop`] set, and what it returns is forgotten. No value depends on the asking.
+    /// whether to go on; if not, the work finds [`BakeMonitor::stop`] set, and what it returns is forgotten. No value depends on the asking.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`] if the caller wants no more.
-    pub fn during<T>(&mut self, stage_fraction: f32, work: impl FnOnce() -> T) -> Result<T, BakeError> {
+    pub fn run_interruptible<T>(
+        &mut self,
+        stage_fraction: f32,
+        work: impl FnOnce() -> T,
+    ) -> Result<T, BakeError> {
         let progress = self.progress(stage_fraction);
         let (callback, stop, done) = (&mut *self.callback, &self.stop, Done::default());
         let result = std::thread::scope(|scope| {
@@ -241,12 +254,12 @@ impl<'a> Watch<'a> {
         Ok(result)
     }
 
-    /// As [`Watch::during`], of work that cannot be asked to end: on a thread of its own, which goes on alone for a while where nobody wants its
+    /// As [`BakeMonitor::run_interruptible`], of work that cannot be asked to end: on a thread of its own, which goes on alone for a while where nobody wants its
     /// result any more.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`] if the caller wants no more.
-    pub fn apart<T: Send + 'static>(
+    pub fn run_detached<T: Send + 'static>(
         &mut self,
         stage_fraction: f32,
         work: impl FnOnce() -> T + Send + 'static,
@@ -256,7 +269,7 @@ impl<'a> Watch<'a> {
         let work = std::sync::Arc::new(Mutex::new(Some(work)));
         let taken = std::sync::Arc::clone(&work);
         let take = |from: &Mutex<Option<_>>| from.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let thread = std::thread::Builder::new().name("bake apart".into()).spawn(move || {
+        let thread = std::thread::Builder::new().name("bake detached".into()).spawn(move || {
             if let Some(work) = take(&taken) {
                 // Nobody may be there to take it.
                 let _ = sender.send(work());
@@ -264,7 +277,7 @@ impl<'a> Watch<'a> {
         });
         let Ok(thread) = thread else {
             return match take(&work) {
-                Some(work) => self.during(stage_fraction, work),
+                Some(work) => self.run_interruptible(stage_fraction, work),
                 None => self.cancelled(),
             };
         };
@@ -285,7 +298,7 @@ impl<'a> Watch<'a> {
     }
 
     fn cancelled<T>(&mut self) -> Result<T, BakeError> {
-        self.tape.flush();
+        self.checkpoint.flush();
         Err(BakeError::Cancelled { stage: self.running().share().name })
     }
 
@@ -309,21 +322,21 @@ impl<'a> Watch<'a> {
         self.stage.map_or(Stage::Layout, |(stage, _)| stage)
     }
 
-    fn place(&self, start: usize, of: usize) -> Place {
-        Place { stage: self.running() as u8, of, start }
+    fn chunk_key(&self, start: usize, of: usize) -> ChunkKey {
+        ChunkKey { stage: self.running() as u8, of, start }
     }
 
     /// The values from `start` on, if an interrupted bake has computed them. None of them: it had no more time for the rest.
-    pub fn recall<T: Record>(&mut self, start: usize, of: usize) -> Option<Vec<T>> {
-        let (values, seconds) = self.tape.next(self.place(start, of))?;
+    pub fn load_chunk<T: Record>(&mut self, start: usize, of: usize) -> Option<Vec<T>> {
+        let (values, seconds) = self.checkpoint.next(self.chunk_key(start, of))?;
         self.clock = Clock { begun: Instant::now(), before: seconds, ..self.clock };
         Some(values)
     }
 
     /// Keeps values, against an interruption.
-    pub fn keep<T: Record>(&mut self, start: usize, of: usize, values: &[T]) {
-        let (place, seconds) = (self.place(start, of), self.seconds());
-        self.tape.record(place, values, seconds);
+    pub fn store_chunk<T: Record>(&mut self, start: usize, of: usize, values: &[T]) {
+        let (key, seconds) = (self.chunk_key(start, of), self.seconds());
+        self.checkpoint.record(key, values, seconds);
     }
 }
 
@@ -365,10 +378,10 @@ mod tests {
             assert_eq!((progress.stage, progress.stage_fraction), ("layout", 0.25));
             if asked < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
-        let mut watch = Watch::new(&mut callback, None);
-        let stop = watch.stop().clone();
+        let mut monitor = BakeMonitor::new(&mut callback, None);
+        let stop = monitor.stop().clone();
         let begun = Instant::now();
-        let ended = watch.during(0.25, || {
+        let ended = monitor.run_interruptible(0.25, || {
             while !stop.is_cancelled() && begun.elapsed() < Duration::from_secs(60) {
                 std::thread::sleep(Duration::from_millis(1));
             }
@@ -385,11 +398,11 @@ mod tests {
             told.push(progress.error);
             ControlFlow::Continue(())
         };
-        let mut watch = Watch::new(&mut callback, None);
-        assert_eq!(watch.during(0.0, || 7), Ok(7));
-        watch.advance(0.0).unwrap();
-        watch.note_error(0.25);
-        watch.advance(1.0).unwrap();
+        let mut monitor = BakeMonitor::new(&mut callback, None);
+        assert_eq!(monitor.run_interruptible(0.0, || 7), Ok(7));
+        monitor.advance(0.0).unwrap();
+        monitor.note_error(0.25);
+        monitor.advance(1.0).unwrap();
         assert_eq!(told, [None, Some(0.25)]);
     }
 
@@ -400,9 +413,10 @@ mod tests {
             std::thread::sleep(3 * TICK);
             7
         };
-        assert_eq!(Watch::new(&mut carry_on, None).apart(0.0, slow), Ok(7));
+        assert_eq!(BakeMonitor::new(&mut carry_on, None).run_detached(0.0, slow), Ok(7));
         let (mut no_more, begun) = (|_| ControlFlow::Break(()), Instant::now());
-        let ended = Watch::new(&mut no_more, None).apart(0.0, || std::thread::sleep(Duration::from_secs(60)));
+        let ended = BakeMonitor::new(&mut no_more, None)
+            .run_detached(0.0, || std::thread::sleep(Duration::from_secs(60)));
         assert_eq!(ended, Err(BakeError::Cancelled { stage: "layout" }));
         assert!(begun.elapsed() < Duration::from_secs(30));
     }
@@ -411,13 +425,13 @@ mod tests {
     #[should_panic(expected = "as it should")]
     fn a_panic_apart_is_the_callers() {
         let mut callback = |_| ControlFlow::Continue(());
-        let _ = Watch::new(&mut callback, None).apart(0.0, || panic!("as it should"));
+        let _ = BakeMonitor::new(&mut callback, None).run_detached(0.0, || panic!("as it should"));
     }
 
     #[test]
     #[should_panic(expected = "as it should")]
     fn a_panic_of_the_work_ends_the_asking() {
         let mut callback = |_| ControlFlow::Continue(());
-        let _ = Watch::new(&mut callback, None).during(0.0, || panic!("as it should"));
+        let _ = BakeMonitor::new(&mut callback, None).run_interruptible(0.0, || panic!("as it should"));
     }
 }
