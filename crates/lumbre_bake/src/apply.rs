@@ -46,7 +46,7 @@ pub(crate) fn apply(world: &mut World, scene: &StaticScene, entities: &Entities,
     place_volume(world, baked.volume.take());
 }
 
-/// Takes away the lightmaps of an earlier bake from everything but `reused_gather`: their light would count twice.
+/// Takes away the lightmaps of an earlier bake from everything but `kept`: their light would count twice.
 fn forget_lightmaps(world: &mut World, kept: &[Vec<Entity>]) {
     let kept: HashSet<_> = kept.iter().flatten().collect();
     let mut mapped = world.query_filtered::<Entity, With<Lightmap>>();

@@ -8,30 +8,25 @@ use lumbre_scene::{IrradianceVolume, Transform};
 
 use crate::apply::apply;
 use crate::checkpoint::CheckpointFile;
-use crate::content_hash::{ContentHash, Hashes, hashes_of};
+use crate::content_hash::hashes_of;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::direct_light::direct_light;
+use crate::final_gather::lit_texels::LitTexels;
 use crate::final_gather::radiance_cache::RadianceCache;
 use crate::final_gather::rounds::{self, IndirectLight};
-use crate::finish::baked_scene::{BakedMap, BakedObject, BakedScene, FilledTexels, baked_objects};
-use crate::finish::fill::fill;
-use crate::finish::pages::Pages;
-use crate::finish::resolution_error::{compare, dense_points};
-use crate::finish::seams::{MapValues, Maps, close_seams};
-use crate::finish::separate_light::separate;
-use crate::finish::worst_places::worst_places;
+use crate::finish::baked_scene::{BakedMap, BakedObject, BakedScene};
+use crate::finish::finished_maps::finished_maps;
+use crate::finish::resolution_error::dense_points;
 use crate::memory;
 use crate::monitor::{BakeMonitor, Callback, Stage};
-use crate::notes::{finish, note_direct_error, note_mean};
 use crate::probes;
 use crate::radiosity::exchange::Exchange;
 use crate::radiosity::patch_light::patch_light;
 use crate::radiosity::patches::Patches;
-use crate::rebake::{Changes, ReusableBake, SampleCollector, Samples, kept_bounces, rebake_report};
-use crate::scene::{StaticScene, density_of, from_world};
-use crate::{
-    BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, ErrorAtTime, Progress, preparing,
-};
+use crate::rebake::{Reuse, Samples, rebake_report, reused_gather};
+use crate::scene::{StaticScene, from_world};
+use crate::summary;
+use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, Progress, preparing};
 
 /// A bake that is about to run: the light of a world's static objects, in lightmaps.
 ///
@@ -184,7 +179,7 @@ impl<'a> Bake<'a> {
             };
             let BakeOutput { objects, maps, volume, samples } =
                 run(scene, &request, &mut monitor, &mut report)?;
-            Ok(BakedScene { objects, maps, volume, samples, report: finish(report, &mut monitor) })
+            Ok(BakedScene { objects, maps, volume, samples, report: summary::finish(report, &mut monitor) })
         };
         match self.options.threads {
             None => bake(),
@@ -196,7 +191,7 @@ impl<'a> Bake<'a> {
     }
 }
 
-/// What the stages have made: a baked scene before its report is finished.
+/// What the stages have made: a baked scene without its report.
 #[derive(Default)]
 struct BakeOutput {
     objects: Vec<BakedObject>,
@@ -205,7 +200,7 @@ struct BakeOutput {
     samples: Option<Samples>,
 }
 
-/// What a bake is to do, without who is told about it.
+/// What a bake is asked to do, apart from whom it reports to.
 struct Request<'a> {
     options: &'a BakeOptions,
     checkpoint: Option<&'a Checkpoint>,
@@ -213,7 +208,7 @@ struct Request<'a> {
     keeps_samples: bool,
 }
 
-/// The stages, in their order; each takes what those before it have found.
+/// Runs the stages in their order: each takes the values that those before it returned.
 fn run(
     input: &Arc<StaticScene>,
     request: &Request<'_>,
@@ -222,17 +217,11 @@ fn run(
 ) -> Result<BakeOutput, BakeError> {
     let options = request.options;
     monitor.stage(Stage::Layout, report)?;
-    let hashes = monitor.run_interruptible(0.0, || hashes_of(input, options))?;
-    report.content_hash = hashes.content.to_string();
-    let reusable = ReusableBake::of(request.former, &hashes, input, options, report);
-    let identity = request.identity(&hashes, reusable.as_ref());
-    monitor.checkpoint = request.open_checkpoint(&identity)?;
+    let mut reuse = request.prepare_reuse(input, monitor, report)?;
     if input.objects.is_empty() {
         return Ok(nothing_to_bake("the scene has no static mesh", report));
     }
-    let space = reusable.as_ref().map_or_else(|| input.space(), |reusable| reusable.space);
-    let density = reusable.as_ref().map(|reusable| reusable.density);
-    let density = density.unwrap_or_else(|| density_of(&input.objects, space, options));
+    let (space, density) = (reuse.space(input), reuse.density(input, options));
     let layout = preparing::layout(input, space, density, options, monitor, report)?;
 
     monitor.stage(Stage::Hierarchy, report)?;
@@ -242,118 +231,67 @@ fn run(
         let why = "no surface emits, no light is static or mixed, and there is no sky";
         return Ok(nothing_to_bake(why, report));
     }
-    let for_samples = request.bytes_of_samples(reusable.is_some());
-    memory::check_texels(&scene, &layout, for_samples, options)?;
+    let sample_bytes = request.sample_bytes(reuse.is_possible());
+    memory::check_texels(&scene, &layout, sample_bytes, options)?;
 
     monitor.stage(Stage::DirectLight, report)?;
     let texels = CoveredTexels::new(&scene, &layout, monitor, report)?;
-    let for_patches = options.of_patches(monitor.clock().is_past(SHORT));
+    let patch_options = options.for_patches(monitor.clock().is_past(SHORT_OF_TIME));
     let resolution = monitor.run_interruptible(1.0, || {
-        memory::resolution(&scene, &texels, for_samples, &for_patches, report)
+        memory::resolution(&scene, &texels, sample_bytes, &patch_options, report)
     })??;
-    let find = |reusable| Changes::find(&reusable, &hashes, &input.objects, &sources, &texels);
-    let changes = monitor.run_interruptible(1.0, || reusable.map(find))?;
+    let changes = monitor.run_interruptible(1.0, || reuse.changes(&input.objects, &sources, &texels))?;
     let known = changes.as_ref().map_or(&[][..], |changes| &changes.known_direct);
     let direct = direct_light(&sources, &texels, known, options, monitor, report)?;
 
-    let of_patches = |patches: &Patches| patch_light(&scene, &texels, &direct, patches);
-    let exchange = Exchange::new(&scene, &sources, &for_patches, resolution, of_patches, monitor, report)?;
-    let (exchange, kept) = match (exchange, &changes) {
-        (None, _) => (None, None),
-        (Some((exchange, _)), None) => (Some(exchange), None),
+    let patch_light = |patches: &Patches| patch_light(&scene, &texels, &direct, patches);
+    let exchange = Exchange::new(&scene, &sources, &patch_options, resolution, patch_light, monitor, report)?;
+    let reused = match (&exchange, &changes) {
         (Some((exchange, factors)), Some(changes)) => {
-            let (kept, rays) =
-                kept_bounces(changes, &sources, &texels, &direct, (&exchange, &factors), options, monitor)?;
-            report.rays += rays;
-            (Some(exchange), Some(kept))
+            let exchange = (exchange, factors);
+            Some(reused_gather(changes, &sources, &texels, &direct, exchange, options, monitor, report)?)
         }
+        _ => None,
     };
-    let (bounced, cache) = match &exchange {
+    let exchange = exchange.map(|(exchange, _)| exchange);
+    let (indirect, cache) = match &exchange {
         None => (IndirectLight::none(&direct), None),
         Some(exchange) => {
             monitor.stage(Stage::FinalGather, report)?;
             let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, monitor)?;
-            let bounced =
-                rounds::gather(&mut cache, &texels, &direct, kept.as_ref(), options, monitor, report)?;
-            (bounced, Some(cache))
+            let indirect =
+                rounds::gather(&mut cache, &texels, &direct, reused.as_ref(), options, monitor, report)?;
+            (indirect, Some(cache))
         }
     };
     let volume = probes::bake(input, &scene, &sources, cache.as_ref(), options, monitor, report)?;
     let points = dense_points(&sources, cache.as_ref(), options, monitor, report)?;
 
     monitor.stage(Stage::Texels, report)?;
-    let light = bounced.with(&direct);
-    let variances = &bounced.variances;
-    note_mean(&texels.list, &light, report);
-    if exchange.is_none() {
-        note_direct_error(&texels.list, &direct, &variances.expected, options, report);
-        report.ended = Ended::after(report.error_reached, monitor.is_late(), true);
-        report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
-    }
-    if let Some(changes) = &changes {
-        report.rebake = Some(rebake_report(changes, &texels.list, kept.as_ref(), report));
-    }
-    let (squares, whole) = (direct.local.relative(&variances.expected), report.estimated_error);
-    report.worst = monitor
-        .run_interruptible(0.0, || worst_places(&scene, &input.objects, &texels.list, &squares, whole))?;
-    // Whoever has more time would not want to keep these.
+    let light = indirect.with(&direct);
+    let lit =
+        LitTexels { scene: &scene, texels: &texels, direct: &direct, indirect: &indirect, light: &light };
+    summary::write(&lit, cache.is_some(), &input.objects, options, monitor, report)?;
+    report.rebake = report.rebake.take().or_else(|| {
+        changes.as_ref().map(|changes| rebake_report(changes, &texels.list, reused.as_ref(), report))
+    });
     let samples = match request.keeps_samples && report.ended != Ended::Time {
+        // A bake with more time would not want to keep what was cut short.
         false => None,
-        true => {
+        true => Some(monitor.run_interruptible(0.0, || {
             let exitance = exchange.as_ref().map(|exchange| exchange.exitance_of(&scene, layout.maps.len()));
-            let found = SampleCollector {
-                scene: &scene,
-                layout: &layout,
-                texels: &texels.list,
-                direct: &direct.texels,
-                gathered: &bounced.gathered,
-                bounced: &bounced.light,
-                reuse_error: kept.as_ref().map_or(&[], |kept| &kept.reuse_error),
-            };
-            let exitance = exitance.unwrap_or_default();
-            Some(monitor.run_interruptible(0.0, || {
-                found.samples(identity, &hashes, &input.objects, &sources, &exitance)
-            })?)
-        }
+            reuse.samples(&lit, reused.as_ref(), &input.objects, &sources, &exitance.unwrap_or_default())
+        })?),
     };
-    monitor.advance(0.2)?;
-    let known = (light.as_slice(), variances.cautious.as_slice());
-    let (mut filled, mut errors) =
-        monitor.run_interruptible(0.2, || fill(&texels, known, options.gap, &scene.stop))?;
-    monitor.advance(1.0)?;
-
-    monitor.stage(Stage::Seams, report)?;
-    let maps = Maps {
-        scene: &scene,
-        layout: &layout,
-        texels: &texels.list,
-        charts: &texels.charts,
-        mean: report.mean_irradiance.iter().sum::<f64>() / 3.0,
-    };
-    let shown = MapValues { light: &mut filled, variances: &mut errors };
-    close_seams(&maps, shown, options, monitor, report)?;
-    monitor.advance(0.9)?;
-    report.resolution =
-        monitor.run_interruptible(0.9, || compare(&scene, &layout, &filled, &errors, &points))?;
-    let pages = monitor.run_interruptible(0.9, || Pages::new(&layout, options.atlas_size, options.gap))?;
-    report.atlases = pages.pages.len();
-    report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
-    let separate = monitor.run_interruptible(1.0, || {
-        let parts = options.separate_light.then_some((&direct, &bounced));
-        parts.map(|parts| separate(&texels, parts, &filled, options.gap, &scene.stop))
-    })?;
-    let found = FilledTexels { irradiance: &filled, variances: &errors, separate: separate.as_ref() };
-    let (objects, maps) =
-        monitor.run_interruptible(1.0, || baked_objects(&input.objects, &layout, &found, &pages))?;
-    monitor.advance(1.0)?;
+    let (objects, maps) = finished_maps(&lit, &points, &input.objects, options, monitor, report)?;
     let volume = volume.map(|placed| (placed.grid.transform(space), placed.volume));
     Ok(BakeOutput { objects, maps, volume, samples })
 }
 
-/// Where more than this share of direct light's time is gone before any light is known, the time is short beside the scene's size.
-const SHORT: f64 = 0.3;
+/// If more than this share of the time for direct light is over before any light is known, then the time is short for a scene of this size.
+const SHORT_OF_TIME: f64 = 0.3;
 
-/// Says why there is no light.
+/// Reports why there is no light to bake.
 fn nothing_to_bake(why: &str, report: &mut BakeReport) -> BakeOutput {
     report.skipped.push(format!("everything: {why}"));
     report.error_reached = true;
@@ -361,24 +299,29 @@ fn nothing_to_bake(why: &str, report: &mut BakeReport) -> BakeOutput {
 }
 
 impl Request<'_> {
-    /// Of all that this bake's bits follow from.
-    fn identity(&self, hashes: &Hashes, reusable: Option<&ReusableBake<'_>>) -> ContentHash {
-        let identity = reusable.map_or(hashes.content, |reusable| reusable.identity(hashes.content));
-        // What is kept takes memory, too: within a limit, other patches may fit.
-        let limited = self.options.memory.is_some() && self.bytes_of_samples(self.former.is_some()) > 0;
-        if limited { identity.made_from(&hashes.sampling) } else { identity }
+    /// Hashes the scene, decides whether samples of a former bake can be used, and opens the checkpoint.
+    fn prepare_reuse(
+        &self,
+        input: &StaticScene,
+        monitor: &mut BakeMonitor<'_>,
+        report: &mut BakeReport,
+    ) -> Result<Reuse<'_>, BakeError> {
+        let hashes = monitor.run_interruptible(0.0, || hashes_of(input, self.options))?;
+        report.content_hash = hashes.content.to_string();
+        // Samples take memory: within a limit, whether they are kept decides which patches fit.
+        let limited = self.options.memory.is_some() && self.sample_bytes(self.former.is_some()) > 0;
+        let reuse = Reuse::new(self.former, hashes, limited, input, self.options, report);
+        if let Some(checkpoint) = self.checkpoint {
+            let opened = CheckpointFile::open(checkpoint, &reuse.identity);
+            monitor.checkpoint =
+                opened.map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })?;
+        }
+        Ok(reuse)
     }
 
-    /// Bytes of a covered texel for the samples of this bake, and for those of a former one where they are used.
-    fn bytes_of_samples(&self, uses_former: bool) -> u64 {
+    /// Bytes that each covered texel takes for samples: those that this bake keeps, and those of a former bake where they are used.
+    fn sample_bytes(&self, uses_former: bool) -> u64 {
         let own = if self.keeps_samples { memory::SAMPLES_BYTES } else { 0 };
         own + if uses_former { memory::FORMER_SAMPLES_BYTES } else { 0 }
-    }
-
-    /// What this bake computes is kept there.
-    fn open_checkpoint(&self, identity: &ContentHash) -> Result<CheckpointFile, BakeError> {
-        let Some(checkpoint) = self.checkpoint else { return Ok(CheckpointFile::default()) };
-        CheckpointFile::open(checkpoint, identity)
-            .map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })
     }
 }

@@ -222,8 +222,8 @@ impl BakeOptions {
         effort
     }
 
-    /// The options for patches and what they exchange: coarse ones where time is `short`, so that the gather gets most of it.
-    pub(crate) fn of_patches(&self, short: bool) -> Self {
+    /// Options for the patches and their form factors: coarser ones if time is `short`, so that the final gather gets most of it.
+    pub(crate) fn for_patches(&self, short: bool) -> Self {
         Self { error: if short { self.error.max(COARSE) } else { self.error }, ..*self }
     }
 

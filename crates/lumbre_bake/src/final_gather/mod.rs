@@ -6,6 +6,8 @@ pub(crate) mod error_ledger;
 pub(crate) mod gather;
 pub(crate) mod gather_sums;
 pub(crate) mod incident;
+pub(crate) mod lit_texels;
+pub(crate) mod map_error;
 pub(crate) mod patch_fallback;
 pub(crate) mod radiance_cache;
 pub(crate) mod reused_gather;

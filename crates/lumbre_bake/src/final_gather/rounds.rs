@@ -1,11 +1,12 @@
 //! Rounds of the final gather: every texel first, then those whose error is still too large, until the error asked for is
 //! reached, the time is up or the quality's most rays are cast.
 
+use crate::final_gather::map_error::MapError;
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::error_estimate::{PatchBias, patch_bias};
-use super::error_ledger::{ErrorLedger, GatherErrors, open_sum, relative_to, root};
+use super::error_ledger::{ErrorLedger, GatherErrors, open_sum};
 use super::patch_fallback::from_patches;
 use super::reused_gather::ReusedGather;
 use super::texel_radiance::GatheredLight;
@@ -74,7 +75,7 @@ impl IndirectLight {
     }
 }
 
-/// Gathers the light by bounces, beginning with what is `reused_gather` of a former bake. The cache then holds what was gathered, too.
+/// Gathers the light by bounces, beginning with what is `kept` of a former bake. The cache then holds what was gathered, too.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -247,16 +248,14 @@ impl<'a> RoundPlanner<'a> {
         };
         let ledger = ErrorLedger { direct: self.direct, gather: Some(gather), light: total as f32 };
         let variances = ledger.total();
-        let sum = open_sum(texels, &local.relative(&variances.expected)) - ledger.by_chance(texels, local);
-        report.estimated_error = root(sum / self.count());
-        report.error_of_mean = relative_to(total, open_sum(texels, &variances.expected) / self.count());
-        report.error_reached = report.estimated_error <= self.options.error;
-        report.error_parts = monitor.run_interruptible(1.0, || ledger.parts(texels, local))?;
+        let stated = MapError::new(&ledger, &variances, texels, local, total);
+        let parts = monitor.run_interruptible(1.0, || ledger.parts(texels, local))?;
+        stated.write_report(self.options.error, parts, report);
         report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
         monitor.note_error(report.estimated_error);
         monitor.advance(1.0)?;
         let light = corrected(&estimates, &patches);
-        Ok(RoundResult { light, unsettled: ledger.by_rays(), variances, sum })
+        Ok(RoundResult { light, unsettled: ledger.by_rays(), variances, sum: stated.relative_squares })
     }
 
     /// Rays for the part of the error that they make smaller.

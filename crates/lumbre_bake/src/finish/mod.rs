@@ -2,6 +2,7 @@
 
 pub(crate) mod baked_scene;
 pub(crate) mod fill;
+pub(crate) mod finished_maps;
 pub(crate) mod pages;
 pub(crate) mod resolution_error;
 pub(crate) mod seams;

@@ -32,7 +32,7 @@ use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
-use crate::{BakeError, BakeOptions};
+use crate::{BakeError, BakeOptions, BakeReport};
 
 /// Rays of a patch and of a block of texels; every other one towards what has changed.
 const RAYS: u32 = 32;
@@ -43,11 +43,16 @@ const BESIDE: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
-/// What is kept of the light by bounces, and about how many rays it took to tell. `exchange` is the new scene's, with its form factors.
+/// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The report counts about how many rays
+/// it took to decide.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
-pub(crate) fn kept_bounces(
+#[expect(
+    clippy::too_many_arguments,
+    reason = "the light of three stages, and the frame that every stage takes"
+)]
+pub(crate) fn reused_gather(
     changes: &Changes<'_>,
     sources: &Sources<'_>,
     texels: &CoveredTexels<'_>,
@@ -55,12 +60,14 @@ pub(crate) fn kept_bounces(
     (exchange, factors): (&Exchange, &FormFactors),
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-) -> Result<(ReusedGather, u64), BakeError> {
+    report: &mut BakeReport,
+) -> Result<ReusedGather, BakeError> {
     let change =
         monitor.run_interruptible(1.0, || IndirectChange::new(sources, changes, texels, &direct.texels))?;
     let of_patches = change.of_patches(exchange, factors, options, monitor)?;
-    let kept = change.keep(exchange, &of_patches, &texels.list, &direct.local, options, monitor)?;
-    Ok((kept, change.rays(&of_patches)))
+    let reused = change.keep(exchange, &of_patches, &texels.list, &direct.local, options, monitor)?;
+    report.rays += change.rays(&of_patches);
+    Ok(reused)
 }
 
 /// The light before and now, as far as it is needed to tell the difference.

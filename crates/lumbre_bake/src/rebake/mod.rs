@@ -21,13 +21,14 @@ mod estimate;
 mod fingerprints;
 mod indirect_change;
 mod report;
+mod reuse;
 mod samples;
 mod samples_file;
 mod settled;
 
-pub(crate) use changes::{Changes, ReusableBake};
-pub(crate) use indirect_change::kept_bounces;
+pub(crate) use indirect_change::reused_gather;
 pub(crate) use report::rebake_report;
+pub(crate) use reuse::Reuse;
 pub use samples::Samples;
-pub(crate) use samples::{SampleCollector, TexelSamples};
+pub(crate) use samples::TexelSamples;
 pub use samples_file::SamplesError;

@@ -1,0 +1,18 @@
+//! The covered texels with all their light, as the stages after the gather take it. Not finished maps: those are `finish`'s.
+
+use glam::Vec3;
+
+use super::rounds::IndirectLight;
+use crate::coverage::covered_texels::CoveredTexels;
+use crate::direct_light::DirectLight;
+use crate::scene::BakeScene;
+
+/// The covered texels and their light.
+pub(crate) struct LitTexels<'a> {
+    pub scene: &'a BakeScene,
+    pub texels: &'a CoveredTexels<'a>,
+    pub direct: &'a DirectLight,
+    pub indirect: &'a IndirectLight,
+    /// Per covered texel, direct and indirect irradiance together, W/m².
+    pub light: &'a [Vec3],
+}

@@ -1,0 +1,60 @@
+//! From the light of the covered texels to the maps that objects show: gaps filled, seams closed, resolution measured, pages composed. The order of these
+//! steps, and not the steps.
+
+use super::baked_scene::{BakedMap, BakedObject, FilledTexels, baked_objects};
+use super::fill::fill;
+use super::pages::Pages;
+use super::resolution_error::{DensePoint, compare};
+use super::seams::{MapValues, Maps, close_seams};
+use super::separate_light::separate;
+use crate::final_gather::lit_texels::LitTexels;
+use crate::monitor::{BakeMonitor, Stage};
+use crate::scene::SceneObject;
+use crate::{BakeError, BakeOptions, BakeReport};
+
+/// The objects of a scene with their finished maps. `points` are what the finished maps are compared with, to measure what their resolution costs.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn finished_maps(
+    lit: &LitTexels<'_>,
+    points: &[DensePoint],
+    objects: &[SceneObject],
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+    report: &mut BakeReport,
+) -> Result<(Vec<BakedObject>, Vec<BakedMap>), BakeError> {
+    let LitTexels { scene, texels, .. } = *lit;
+    let layout = texels.layout;
+    monitor.advance(0.2)?;
+    let light_and_errors = (lit.light, lit.indirect.variances.cautious.as_slice());
+    let (mut irradiance, mut variances) =
+        monitor.run_interruptible(0.2, || fill(texels, light_and_errors, options.gap, &scene.stop))?;
+    monitor.advance(1.0)?;
+
+    monitor.stage(Stage::Seams, report)?;
+    let maps = Maps {
+        scene,
+        layout,
+        texels: &texels.list,
+        charts: &texels.charts,
+        mean: report.mean_irradiance.iter().sum::<f64>() / 3.0,
+    };
+    let values = MapValues { light: &mut irradiance, variances: &mut variances };
+    close_seams(&maps, values, options, monitor, report)?;
+    monitor.advance(0.9)?;
+    report.resolution =
+        monitor.run_interruptible(0.9, || compare(scene, layout, &irradiance, &variances, points))?;
+    let pages = monitor.run_interruptible(0.9, || Pages::new(layout, options.atlas_size, options.gap))?;
+    report.atlases = pages.pages.len();
+    report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
+    let separate = monitor.run_interruptible(1.0, || {
+        options
+            .separate_light
+            .then(|| separate(texels, (lit.direct, lit.indirect), &irradiance, options.gap, &scene.stop))
+    })?;
+    let filled = FilledTexels { irradiance: &irradiance, variances: &variances, separate: separate.as_ref() };
+    let finished = monitor.run_interruptible(1.0, || baked_objects(objects, layout, &filled, &pages))?;
+    monitor.advance(1.0)?;
+    Ok(finished)
+}

@@ -1,0 +1,76 @@
+//! What a bake writes into its report about the whole: its light, its error, its time. Not how they are computed.
+
+use glam::{DVec3, Vec3};
+
+use crate::coverage::footprint::Texel;
+use crate::final_gather::error_ledger::ErrorLedger;
+use crate::final_gather::lit_texels::LitTexels;
+use crate::final_gather::map_error::MapError;
+use crate::finish::worst_places::worst_places;
+use crate::monitor::BakeMonitor;
+use crate::scene::SceneObject;
+use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
+
+/// Ends the last stage and writes the times.
+pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> BakeReport {
+    monitor.end_stage(&mut report);
+    // Saving the result may be interrupted, too.
+    monitor.checkpoint.flush();
+    report.seconds = monitor.seconds();
+    // Only now is there a map with that error.
+    if !report.curve.is_empty() {
+        report.curve.push(ErrorAtTime { seconds: report.seconds, error: report.estimated_error });
+    }
+    report.resumed_seconds = monitor.checkpoint.resumed;
+    report.warnings.append(&mut monitor.checkpoint.warnings);
+    let casting: f64 = report
+        .stages
+        .iter()
+        .filter(|stage| {
+            ["direct light", "form factors", "final gather", "probes", "resolution"]
+                .contains(&stage.stage.as_str())
+        })
+        .map(|stage| stage.seconds)
+        .sum();
+    report.mega_rays_per_second = if casting > 0.0 { report.rays as f64 * 1e-6 / casting } else { 0.0 };
+    report
+}
+
+/// Writes what is known once every texel has its light: its mean, the error of a map without bounces, and the worst places.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn write(
+    lit: &LitTexels<'_>,
+    bounces: bool,
+    objects: &[SceneObject],
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+    report: &mut BakeReport,
+) -> Result<(), BakeError> {
+    let LitTexels { scene, texels, direct, indirect, light } = *lit;
+    let (list, errors) = (&texels.list, &indirect.variances);
+    report.mean_irradiance = mean_irradiance(list, light).to_array();
+    if !bounces {
+        // With bounces the rounds of the gather have stated the error.
+        let ledger = ErrorLedger::of_direct_light(direct);
+        let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
+        let stated = MapError::new(&ledger, errors, list, &direct.local, mean);
+        stated.write_report(options.error, ledger.parts(list, &direct.local), report);
+        report.ended = Ended::after(report.error_reached, monitor.is_late(), true);
+        report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
+    }
+    let (squares, whole) = (direct.local.relative(&errors.expected), report.estimated_error);
+    report.worst = monitor.run_interruptible(0.0, || worst_places(scene, objects, list, &squares, whole))?;
+    Ok(())
+}
+
+/// Mean over the texels that show a surface, W/m².
+fn mean_irradiance(texels: &[Texel], light: &[Vec3]) -> DVec3 {
+    let (mut sum, mut count) = (DVec3::ZERO, 0u32);
+    for (_, light) in texels.iter().zip(light).filter(|(texel, _)| !texel.is_hidden()) {
+        sum += light.as_dvec3();
+        count += 1;
+    }
+    sum / f64::from(count.max(1))
+}
