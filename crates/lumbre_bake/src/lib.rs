@@ -3,17 +3,18 @@
 //! No GPU, no files: `lumbre_scene` loads and saves. Light bounces between patches; texels show it.
 //!
 //! ```text
-//!   World ─► scene ─────────► transport ──────────────► texels ──────────────► transport ────────► texels ───────────────► BakedScene ─► World
-//!            StaticScene       emitters, lights          covered texels          patches             radiance cache          uv1
-//!            lightmap layout   (trees, bounds)           direct light            form factors        final gather, rounds    Lightmap E/π
-//!            triangles, BVH                              local light             solver              error ledger            TexelErrors
-//!                                                                                                    smooth ─► fill ─► seams
-//!                                                                                                    probes: grid ─► light ─► fill ─► IrradianceVolume
+//!   World ─► scene ─► sources ─► coverage ─► direct_light ─► radiosity ──────► final_gather ──► finish ──► BakedScene ─► World
+//!            layout   emitters   what each   local light,    patches,          rays, rounds,    fill        uv1
+//!            BVH      lights     texel       shared samples  form factors,     error ledger     seams       Lightmap E/π
+//!            rooms    (trees)    shows            │          solver                │            pages       TexelErrors
+//!                                                 └────────── denoise ─────────────┘
+//!            visibility: occlusion by geometry alone         probes: the same gather in the air ──────────► IrradianceVolume
+//!
 //!   checkpoint: what stages have computed, in chunks ─► the same bits after an interruption
-//!   Samples of a former bake ─► rebake: what changed ─► which texels keep their direct light, and their bounces ─► Samples
+//!   rebake: Samples of a former bake ─► what changed ─► which texels keep their direct light and their bounces ─► Samples
 //! ```
 //!
-//! [`Bake`] is the entrance; `bake.rs` tells the stages in their order, and docs/baking.md the life of one photon through these folders.
+//! Start at [`Bake`]: `bake.rs` calls the stages in their order, and docs/baking.md follows one photon through these folders.
 //!
 //! Everything is computed in canonical units (relative to the scene's centre, scaled by a power of two), with one seed per
 //! texel and patch: the same bits on any number of threads and at any 2^k scale of an emissive scene.

@@ -12,6 +12,7 @@ mod held_out;
 mod atlases;
 mod checkpoint;
 mod content_hash;
+mod coverage;
 mod emitters;
 mod error_curve;
 mod hard_cases;
