@@ -16,7 +16,7 @@ const MACHINE_CHECKED: usize = 64;
 /// Random inputs are made in pieces of this size, each with its own sequence.
 const PIECE: usize = 10_000;
 /// How many of a million random inputs may be within rounding of a condition.
-const MOST_OPEN: usize = 2_000;
+const MAX_OPEN: usize = 2_000;
 /// Number of inputs of any size.
 const WILD: usize = 100_000;
 /// Numbers at which results overflow, underflow or vanish.
@@ -154,7 +154,7 @@ impl Twin {
         let random = self.compare(&self.random_inputs(count), gpu);
         let verdict = Verdict {
             name: self.name.clone(),
-            most_open: MOST_OPEN,
+            most_open: MAX_OPEN,
             hard: self.compare(&hard, gpu),
             random,
             wild: self.wild(gpu),

@@ -5,7 +5,7 @@ use glam::DVec2;
 
 /// Largest number of hull edges that are tried. A hull with more is nearly round, so trying every n-th edge
 /// suffices.
-const MOST_EDGES: usize = 256;
+const MAX_EDGES: usize = 256;
 
 /// A rotated rectangle: the points lie between `min` and `max` along `axis` and its perpendicular.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,7 @@ impl BoundingRectangle {
     pub fn least_area(points: &[DVec2]) -> Self {
         let hull = convex_hull(points);
         let mut best = along(DVec2::X, &hull);
-        let stride = hull.len().div_ceil(MOST_EDGES).max(1);
+        let stride = hull.len().div_ceil(MAX_EDGES).max(1);
         for i in (0..hull.len()).step_by(stride) {
             let edge = hull[(i + 1) % hull.len()] - hull[i];
             let Some(axis) = edge.try_normalize() else { continue };

@@ -45,7 +45,7 @@ mod weld;
 
 pub use adjacency::Adjacency;
 pub use plane::MeshPlane;
-pub use surface_spread::{MOST_PATCHES, NormalCone, SurfacePatch, SurfaceSpread};
+pub use surface_spread::{MAX_PATCHES, NormalCone, SurfacePatch, SurfaceSpread};
 pub use tangents::TextureCoordinateSet;
 pub use triangle_mesh::{MeshError, TriangleMesh};
 pub use unwrap::{Chart, Charted, UnwrapError, UnwrapOptions, Unwrapped, unwrap};

@@ -39,13 +39,13 @@ pub struct SurfacePatch {
 pub struct SurfaceSpread {
     /// Bounds over all triangles; `None` for a mesh without area.
     pub whole: Option<SurfacePatch>,
-    /// A partition of the triangles into at most [`MOST_PATCHES`] patches, those with the longest edges and
+    /// A partition of the triangles into at most [`MAX_PATCHES`] patches, those with the longest edges and
     /// the largest normal differences first.
     pub patches: Vec<SurfacePatch>,
 }
 
 /// Largest number of patches of a mesh. In a mesh with fewer triangles, every triangle is a patch.
-pub const MOST_PATCHES: usize = 1 << HALVINGS;
+pub const MAX_PATCHES: usize = 1 << HALVINGS;
 const HALVINGS: u32 = 7;
 
 impl SurfaceSpread {
@@ -195,7 +195,7 @@ mod tests {
         assert!((all_coarse.normals - all_coarse.edge).abs() < 1e-5, "{all_coarse:?}");
         assert!((all_coarse.normals / all_fine.normals - 4.0).abs() < 0.2, "{all_coarse:?} {all_fine:?}");
         assert!(all_fine.cone.is_none_or(|cone| cone.half_angle > 3.0), "{all_fine:?}");
-        assert_eq!(fine.patches.len(), MOST_PATCHES);
+        assert_eq!(fine.patches.len(), MAX_PATCHES);
         // A round 128th of a sphere would have a half-angle of 0.18.
         let angles: Vec<f64> = fine.patches.iter().map(|patch| patch.cone.unwrap().half_angle).collect();
         assert!(angles.iter().all(|angle| *angle < 0.5), "{angles:?}");

@@ -14,7 +14,7 @@ use crate::{MeshError, TriangleMesh};
 
 /// Most triangles that may meet at one position. The library's time grows with the square of their number,
 /// and its stack with the number itself. The caps and poles of shapes have some hundred.
-const MOST_AROUND: usize = 4096;
+const MAX_AROUND: usize = 4096;
 
 /// One of a mesh's sets of texture coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -56,7 +56,7 @@ impl TriangleMesh {
         };
         let tangents = if coordinates.is_empty()
             || self.normals.is_empty()
-            || self.most_triangles_around_a_place() > MOST_AROUND
+            || self.most_triangles_around_a_place() > MAX_AROUND
         {
             vec![Vec4::ZERO; self.indices.len()]
         } else {

@@ -5,7 +5,7 @@
 use glam::{DVec3, DVec4};
 
 /// Openness below this counts as 0: nothing is known about the light there, and the result is black.
-pub const LEAST_OPENNESS: f64 = 1e-12;
+pub const MIN_OPENNESS: f64 = 1e-12;
 
 /// Returns E/π for a surface with this unit normal: the three sides that it faces, weighted by the squared
 /// components of the normal, which add up to 1.
@@ -34,7 +34,7 @@ pub const LEAST_OPENNESS: f64 = 1e-12;
 pub fn ambient_cube(normal: DVec3, x: DVec4, y: DVec4, z: DVec4) -> DVec3 {
     let weights = normal * normal;
     let sum = weights.x * x + weights.y * y + weights.z * z;
-    sum.truncate() / sum.w.max(LEAST_OPENNESS)
+    sum.truncate() / sum.w.max(MIN_OPENNESS)
 }
 
 #[cfg(test)]

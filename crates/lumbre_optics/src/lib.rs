@@ -85,7 +85,7 @@ mod two_sided;
 mod validation;
 mod viewer;
 
-pub use ambient_cube::{LEAST_OPENNESS, ambient_cube};
+pub use ambient_cube::{MIN_OPENNESS, ambient_cube};
 pub use angle::quarter_angle;
 pub use attenuation::{
     Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate, attenuate_quadratic,

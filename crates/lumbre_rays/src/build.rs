@@ -30,7 +30,7 @@ const NEIGHBOURS_ONLY: usize = 3;
 
 /// PLOC and reinsertion choose by surface area, so both take quadratic time among n equal boxes. A mesh with more
 /// equal boxes than this is split at the median instead.
-const MOST_COINCIDENT: usize = 64;
+const MAX_COINCIDENT: usize = 64;
 
 /// Builds the hierarchy of (index, canonical triangle) pairs, all of them finite.
 pub(crate) fn build(triangles: &[(u32, [Vec3; 3])]) -> WideTree {
@@ -39,7 +39,7 @@ pub(crate) fn build(triangles: &[(u32, [Vec3; 3])]) -> WideTree {
         return tree;
     }
     let boxes: Vec<Aabb> = triangles.iter().map(|(_, t)| Aabb::from_points(&t.map(Vec3A::from))).collect();
-    if most_coincident(&boxes) > MOST_COINCIDENT {
+    if most_coincident(&boxes) > MAX_COINCIDENT {
         build_balanced(&mut tree, triangles);
         return tree;
     }

@@ -31,12 +31,12 @@ impl Bvh {
     /// listed by [`skipped`](Self::skipped). An empty list gives a hierarchy that nothing hits. At most 2^29
     /// triangles are kept; those after are listed as skipped.
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
-        const MOST_TRIANGLES: usize = 1 << 29;
+        const MAX_TRIANGLES: usize = 1 << 29;
         let (mut kept, mut skipped) = (Vec::with_capacity(triangles.len()), Vec::new());
         let mut largest = 0.0f32;
         for (index, triangle) in triangles.iter().enumerate() {
             let index = u32::try_from(index).unwrap_or(u32::MAX);
-            if has_area(triangle) && kept.len() < MOST_TRIANGLES {
+            if has_area(triangle) && kept.len() < MAX_TRIANGLES {
                 kept.push((index, *triangle));
                 largest = triangle.iter().fold(largest, |size, vertex| size.max(vertex.abs().max_element()));
             } else {

@@ -269,7 +269,7 @@ impl Drawn {
 /// Fewest rounds: with fewer, the spread would be meaningless.
 const FEWEST_ROUNDS: usize = 5;
 /// Most rounds: variations over a longer time come from the machine's load.
-const MOST_ROUNDS: usize = 101;
+const MAX_ROUNDS: usize = 101;
 
 /// Measures a scene's frame with all its effects, and without each of `effects` in turn. `scene` creates the
 /// scene and the options of its frame anew for each of these. Rounds go on for about `time`; they are
@@ -301,7 +301,7 @@ pub fn effect_costs<E: From<RenderError>>(
     }
     let begun = Instant::now();
     let mut rounds: Vec<Vec<f64>> = Vec::new();
-    while rounds.len() < FEWEST_ROUNDS || (begun.elapsed() < time && rounds.len() < MOST_ROUNDS) {
+    while rounds.len() < FEWEST_ROUNDS || (begun.elapsed() < time && rounds.len() < MAX_ROUNDS) {
         rounds.push(frames.iter_mut().map(|frame| frame.milliseconds(&target)).collect::<Result<_, _>>()?);
     }
 

@@ -29,7 +29,7 @@ pub struct Gpu {
 type LeastLimit = (&'static str, fn(&wgpu::Limits) -> u64, u64);
 
 /// The limits of a device that bound what a frame binds, with the least values that are required.
-const LEAST_LIMITS: [LeastLimit; 4] = [
+const MIN_LIMITS: [LeastLimit; 4] = [
     ("max_bind_groups", |limits| u64::from(limits.max_bind_groups), 4),
     (
         "max_storage_buffers_per_shader_stage",
@@ -76,7 +76,7 @@ impl Gpu {
         queue: wgpu::Queue,
     ) -> Result<Self, RenderError> {
         let limits = device.limits();
-        for (limit, found, least) in LEAST_LIMITS {
+        for (limit, found, least) in MIN_LIMITS {
             let found = found(&limits);
             if found < least {
                 return Err(RenderError::DeviceTooSmall { limit, least, found });

@@ -12,7 +12,7 @@ use crate::light_counter::PassCounts;
 use crate::stage_clock::milliseconds;
 
 /// Largest number of open frames: more than the graph measures at once.
-const MOST_OPEN: usize = 8;
+const MAX_OPEN: usize = 8;
 
 /// A frame whose results have not all arrived.
 #[derive(Debug)]
@@ -42,7 +42,7 @@ pub(crate) struct Ledger {
 
 impl Ledger {
     pub fn open(&mut self, frame: OpenFrame) {
-        if self.open.len() == MOST_OPEN {
+        if self.open.len() == MAX_OPEN {
             self.open.pop_front();
         }
         self.open.push_back(frame);
@@ -172,6 +172,6 @@ mod tests {
     fn what_never_arrives_is_forgotten() {
         let mut ledger = Ledger::default();
         (1..=100).for_each(|number| ledger.open(frame(number, false)));
-        assert_eq!(ledger.open.len(), MOST_OPEN);
+        assert_eq!(ledger.open.len(), MAX_OPEN);
     }
 }

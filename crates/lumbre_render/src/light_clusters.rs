@@ -21,7 +21,7 @@ const MANY_ENTRIES: f64 = 3e6;
 /// Number of lights that the list entries are estimated from, if there are more.
 const SAMPLED_LIGHTS: usize = 1000;
 /// Largest number of depth slices.
-const MOST_SLICES: f64 = 96.0;
+const MAX_SLICES: f64 = 96.0;
 /// By how much a light's range is enlarged, relative to the range and to the distance from the origin of
 /// frame space. This covers the rounding of points, of the depth and of its logarithm on the device.
 const RANGE_MARGIN: f64 = 1e-4;
@@ -420,7 +420,7 @@ impl Depths {
             return one;
         }
         if !columns.perspective {
-            let count = ((far - near) / width).ceil().clamp(1.0, MOST_SLICES);
+            let count = ((far - near) / width).ceil().clamp(1.0, MAX_SLICES);
             let scale = count / (far - near);
             return Self { count: count as u32, scale, bias: -near * scale, ..one };
         }
@@ -428,7 +428,7 @@ impl Depths {
         let octaves = (far / near).log2();
         // Slices are as deep as tiles are wide, or deeper if there would be too many.
         let per_octave = 1.0 / (1.0 + width).log2();
-        let count = (octaves * per_octave).ceil().clamp(1.0, MOST_SLICES);
+        let count = (octaves * per_octave).ceil().clamp(1.0, MAX_SLICES);
         let scale = count / octaves;
         Self { count: count as u32, scale, bias: -near.log2() * scale, ..one }
     }

@@ -13,7 +13,7 @@ const STRIDE: u64 = 256;
 /// Four words per pass: tested and contributing, 64 bits each.
 const WORDS: usize = 4;
 /// Largest number of frames whose counts are being read back at once.
-const MOST_ON_THE_WAY: usize = 4;
+const MAX_ON_THE_WAY: usize = 4;
 /// Storage buffers that a variant with every feature reads. Counting needs one more.
 const OTHER_STORAGE_BUFFERS: u32 = 8;
 
@@ -118,7 +118,7 @@ impl LightCounter {
     /// Returns the buffer of counts and a buffer to copy it into within the frame's commands; `None` if too
     /// many copies are being read back.
     pub fn copy(&mut self, gpu: &Gpu) -> Option<[wgpu::Buffer; 2]> {
-        let counts = self.counts.clone().filter(|_| self.on_the_way.len() < MOST_ON_THE_WAY)?;
+        let counts = self.counts.clone().filter(|_| self.on_the_way.len() < MAX_ON_THE_WAY)?;
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         let copy = self.free.pop().unwrap_or_else(|| buffer(gpu, "light counts on their way", usage));
         Some([counts, copy])

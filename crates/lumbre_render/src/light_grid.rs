@@ -8,7 +8,7 @@ use glam::{DVec3, I64Vec3};
 use crate::extract::LightReach;
 
 /// A light whose sphere covers more cells than this is returned for every box.
-const MOST_CELLS: f64 = 64.0;
+const MAX_CELLS: f64 = 64.0;
 
 /// The lights of a frame by their position.
 #[derive(Debug, Default)]
@@ -54,7 +54,7 @@ impl LightGrid {
         let sizes = most - least + 1.0;
         let within = least.abs().max(most.abs()).max_element() < 1e15;
         // Both comparisons are false for NaN.
-        let few = within && sizes.element_product() <= MOST_CELLS;
+        let few = within && sizes.element_product() <= MAX_CELLS;
         let [least, most] = [least, most].map(|cell| cell.as_i64vec3());
         few.then(|| {
             (least.z..=most.z).flat_map(move |z| {

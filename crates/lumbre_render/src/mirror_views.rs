@@ -14,7 +14,7 @@ use crate::extract::{CameraView, MirrorData, MirrorSurface, Object, Objects, Win
 use crate::frame_plan::MirrorShape;
 
 /// Largest number of views in mirrors in a frame.
-pub(crate) const MOST_VIEWS: usize = 16;
+pub(crate) const MAX_VIEWS: usize = 16;
 /// Mirrors in the same plane share a view. Their normals may differ by at most this much, as the sine of the
 /// angle.
 const SAME_DIRECTION: f64 = 1e-6;
@@ -68,7 +68,7 @@ struct SeenPlane {
 }
 
 /// Returns the views in the mirrors that the camera sees, in the mirrors that are visible in these, and so on
-/// up to `depth` reflections; parents come before children. The draws are still empty. Beyond [`MOST_VIEWS`],
+/// up to `depth` reflections; parents come before children. The draws are still empty. Beyond [`MAX_VIEWS`],
 /// the views that matter least are left out together with those in them, and a message is added to
 /// `left_out`.
 pub(crate) fn mirror_views(
@@ -93,7 +93,7 @@ pub(crate) fn mirror_views(
         let mut children = Vec::new();
         for (parent, view, weight, seen) in seen {
             let Some(reflected) = view.reflected(seen.plane, seen.window) else { continue };
-            if views.len() == MOST_VIEWS {
+            if views.len() == MAX_VIEWS {
                 without += 1;
                 continue;
             }
@@ -106,7 +106,7 @@ pub(crate) fn mirror_views(
     }
     if without > 0 {
         left_out.push(format!(
-            "what {without} more mirrors show: a frame has {MOST_VIEWS} views of mirrors at most, those that cover most of it; let mirrors lie in one plane, or \
+            "what {without} more mirrors show: a frame has {MAX_VIEWS} views of mirrors at most, those that cover most of it; let mirrors lie in one plane, or \
              lower `mirror_depth`"
         ));
     }

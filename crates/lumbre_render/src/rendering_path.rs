@@ -14,7 +14,7 @@ use crate::{FrameOptions, RenderingPath};
 const ENOUGH_LIGHTS: u32 = 64;
 /// Most pixels of the frame per triangle of the scene at which it gains. Blocks of 16 pixels are shaded for
 /// each triangle, and larger triangles fill them.
-const MOST_PIXELS: u64 = 16;
+const MAX_PIXELS: u64 = 16;
 
 /// The rendering path of a frame, by the reason for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +59,7 @@ impl ChosenPath {
             RenderingPath::Deferred => Self::Asked(RenderingPath::Deferred),
             RenderingPath::Auto if !lit_by_pixel => Self::NotDeferrable,
             RenderingPath::Auto if clustered < ENOUGH_LIGHTS => Self::FewLights(clustered),
-            RenderingPath::Auto if pixels > MOST_PIXELS * triangles as u64 => {
+            RenderingPath::Auto if pixels > MAX_PIXELS * triangles as u64 => {
                 Self::LargeTriangles { triangles, pixels }
             }
             RenderingPath::Auto if options.lightmaps && lightmapped > 0 => Self::Lightmaps(lightmapped),
@@ -85,7 +85,7 @@ impl Display for ChosenPath {
             }
             Self::LargeTriangles { triangles, pixels } => write!(
                 out,
-                "forward: {triangles} triangles are less than one for every {MOST_PIXELS} of the frame's {pixels} pixels"
+                "forward: {triangles} triangles are less than one for every {MAX_PIXELS} of the frame's {pixels} pixels"
             ),
             Self::Lightmaps(objects) => {
                 write!(out, "forward: {objects} objects have lightmaps, and each map would be lit apart")

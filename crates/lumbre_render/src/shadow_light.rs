@@ -7,7 +7,7 @@ use lumbre_optics::{Light, LightKind};
 use lumbre_scene::GlobalTransform;
 
 /// Largest number of views of all lights of a frame.
-pub(crate) const MOST_VIEWS: usize = 128;
+pub(crate) const MAX_VIEWS: usize = 128;
 /// Number of cascades of a directional light.
 pub(crate) const CASCADES: usize = 3;
 /// A spotlight with a larger half angle than this, in radians, has six views like a point light.
@@ -68,14 +68,14 @@ impl ShadowLight {
         first_view: usize,
     ) -> Option<Self> {
         let kind = light.shadow.then(|| ShadowKind::of(light))??;
-        if first_view + kind.views() > MOST_VIEWS {
+        if first_view + kind.views() > MAX_VIEWS {
             return None;
         }
         let cone =
             light.spot.filter(|cone| !cone.is_everywhere()).map_or(0.0, |cone| cone.cosines().outer.acos());
         let size = light_size(kind, light);
         Some(Self {
-            // Less than MOST_VIEWS.
+            // Less than MAX_VIEWS.
             first_view: first_view as u32,
             kind,
             entity,

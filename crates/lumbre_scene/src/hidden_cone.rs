@@ -12,9 +12,9 @@ use serde::Serialize;
 use crate::{Bounds, ChildOf, GlobalTransform, Mesh, Name, SceneSettings, hidden_entities};
 
 /// Most triangles that are tested in all, so that the search ends within a second.
-const MOST_TRIANGLES: usize = 20_000_000;
+const MAX_TRIANGLES: usize = 20_000_000;
 /// Most cones that are reported.
-const MOST_CONES: usize = 20;
+const MAX_CONES: usize = 20;
 
 /// A cone that hits the inside of a triangle but contains none of the points where its lighting is evaluated.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -52,7 +52,7 @@ pub fn hidden_cones(world: &mut World) -> Vec<HiddenCone> {
         return Vec::new();
     }
     let mut found = Vec::new();
-    let mut left = MOST_TRIANGLES;
+    let mut left = MAX_TRIANGLES;
     let hidden = hidden_entities(world);
     let mut query =
         world
@@ -74,7 +74,7 @@ pub fn hidden_cones(world: &mut World) -> Vec<HiddenCone> {
         mesh.0.positions.iter().for_each(|at| bounds.include(transform.0.transform_point3(at.as_dvec3())));
         for cone in cones.iter().filter(|cone| cone.meets(&bounds)) {
             left = left.saturating_sub(mesh.0.triangle_count());
-            if left == 0 || found.len() == MOST_CONES {
+            if left == 0 || found.len() == MAX_CONES {
                 return found;
             }
             let hidden = mesh.0.triangles().find_map(|corners| {

@@ -9,7 +9,7 @@ use crate::{GlobalTransform, IrradianceVolume};
 
 /// The largest side of a 3D texture that every GPU supports. The six sides of the cubes take 1 x 2 x 3 times
 /// the texels of the grid along x, y and z.
-const MOST_TEXELS: u32 = 2048;
+const MAX_TEXELS: u32 = 2048;
 /// Smallest length of a cell in metres. Coordinates in cells then stay within f32 wherever a camera can be.
 const SHORTEST_CELL: f64 = 1e-9;
 /// Largest off-diagonal part of a matrix relative to its largest entry that still counts as unrotated: the
@@ -125,7 +125,7 @@ impl IrradianceVolume {
         if cells == 0 || cells != found as u128 {
             return Err(IrradianceVolumeError::Cubes { found, resolution });
         }
-        let room = [MOST_TEXELS, MOST_TEXELS / 2, MOST_TEXELS / 3];
+        let room = [MAX_TEXELS, MAX_TEXELS / 2, MAX_TEXELS / 3];
         if resolution.cmpgt(UVec3::from_array(room)).any() {
             return Err(IrradianceVolumeError::TooManyCells { resolution });
         }

@@ -12,7 +12,7 @@ use crate::surface_point::SurfacePoint;
 /// the offset of ray origins.
 const TOGETHER: f64 = 64.0 / (1 << 24) as f64;
 /// Largest number of surfaces in one place.
-const MOST_TOGETHER: usize = 8;
+const MAX_TOGETHER: usize = 8;
 /// Least cosine between the normals of coplanar surfaces.
 const PARALLEL: f64 = 0.999_999;
 
@@ -50,7 +50,7 @@ pub(crate) fn coplanar_solids(
 ) -> Vec<(usize, bool, f64)> {
     let mut found: Vec<(usize, bool, f64)> = Vec::new();
     let place = Place::of(ray, point);
-    while found.len() < MOST_TOGETHER {
+    while found.len() < MAX_TOGETHER {
         let next = scene.geometry.closest(&place.around, 2.0 * place.reach, |crossing| {
             crossing.object != point.object
                 && scene.is_solid(crossing.object)

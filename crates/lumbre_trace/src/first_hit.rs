@@ -53,12 +53,12 @@ pub(crate) struct FirstHits {
 }
 
 /// Largest number of samples per pixel, which is enough for smooth edges.
-const MOST_SAMPLES: u32 = 16;
+const MAX_SAMPLES: u32 = 16;
 
 impl FirstHits {
     /// Takes the same sample positions as the picture's own first pass.
     pub fn of(view: &View) -> Self {
-        let samples = view.options.samples.unwrap_or(MOST_SAMPLES).min(MOST_SAMPLES);
+        let samples = view.options.samples.unwrap_or(MAX_SAMPLES).min(MAX_SAMPLES);
         let (width, height) = view.size();
         let pixel = |x: usize, y: usize| {
             let (mut albedo, mut normal, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);

@@ -72,7 +72,7 @@ pub(crate) struct EmitterSample {
 const FEW_LAMPS: usize = 16;
 /// Lower bound of the emissive texture's luminance where a triangle is weighed: a texture that is dark at the
 /// centroid may be bright elsewhere.
-const LEAST_TINT: f64 = 0.1;
+const MIN_TINT: f64 = 0.1;
 /// Lower bound of the cosine with which a lamp with a size is weighed: part of it may be above the horizon
 /// where its centre is not.
 const SIZED_FLOOR: f64 = 0.1;
@@ -99,7 +99,7 @@ impl LightSampler {
             let cross = (b - a).cross(c - a);
             let area = 0.5 * cross.length();
             if area > 0.0 && area.is_finite() {
-                let tint = luminance(tint(object, number, [1.0 / 3.0; 2])).max(LEAST_TINT);
+                let tint = luminance(tint(object, number, [1.0 / 3.0; 2])).max(MIN_TINT);
                 emitters.push(Emitter { object: index, number, corners, normal: cross / (2.0 * area), area });
                 powers.push(area * shines * tint);
                 triangles.push(triangle);

@@ -36,7 +36,7 @@ enum Shape {
 
 /// Least probability of a lobe that exists: where the density of one is low, the other may still reflect
 /// much.
-const LEAST_CHANCE: f64 = 0.1;
+const MIN_CHANCE: f64 = 0.1;
 
 impl Lobes {
     pub fn new(model: ReflectionModel, surface: &SurfaceSample, normal: DVec3, viewer: DVec3) -> Self {
@@ -64,8 +64,8 @@ impl Lobes {
         let shiny = surface.specular.element_sum() * share;
         let specular = match (diffuse > 0.0, surface.specular != DVec3::ZERO) {
             (_, false) => 0.0,
-            (false, true) => 1.0 - LEAST_CHANCE,
-            (true, true) => (shiny / (diffuse + shiny)).clamp(LEAST_CHANCE, 1.0 - LEAST_CHANCE),
+            (false, true) => 1.0 - MIN_CHANCE,
+            (true, true) => (shiny / (diffuse + shiny)).clamp(MIN_CHANCE, 1.0 - MIN_CHANCE),
         };
         Self { model, surface: *surface, normal, viewer, specular, shape }
     }

@@ -22,7 +22,7 @@ pub(crate) struct MediumStack(SmallVec<[Layer; 4]>);
 
 /// Largest number of surfaces that are crossed to find the media of a point. More than this mean a broken
 /// scene.
-const MOST_SURFACES: usize = 4096;
+const MAX_SURFACES: usize = 4096;
 
 impl MediumStack {
     /// Finds the media at a point in free space with a ray to infinity: a solid that it leaves without having
@@ -36,7 +36,7 @@ impl MediumStack {
         let direction = DVec3::new(0.5377, 0.7213, 0.4368).normalize();
         let mut entered: Vec<usize> = Vec::new();
         let mut ray = SpaceRay::new(point, direction);
-        for _ in 0..MOST_SURFACES {
+        for _ in 0..MAX_SURFACES {
             let found =
                 scene.geometry.closest(&ray, f64::INFINITY, |crossing| scene.is_solid(crossing.object));
             let Some(meeting) = found else { break };

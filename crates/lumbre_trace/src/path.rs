@@ -40,7 +40,7 @@ const SAFE_DEPTH: u32 = 4;
 const LIKELIEST: f64 = 0.95;
 /// Largest number of surfaces of a path, including those that it goes straight through: thin sheets and
 /// partly covering surfaces.
-const MOST_SURFACES: u32 = 100_000;
+const MAX_SURFACES: u32 = 100_000;
 
 /// The state of a path while it is traced.
 struct Walk {
@@ -97,7 +97,7 @@ impl<'a> Paths<'a> {
             rays: 0,
             first: true,
         };
-        for _ in 0..MOST_SURFACES {
+        for _ in 0..MAX_SURFACES {
             if self.step(&mut walk, numbers) == Next::Ends {
                 break;
             }

@@ -22,7 +22,7 @@ pub(crate) enum Glass {
 }
 
 /// Largest number of surfaces that a ray passes. By then no light is left, or the scene is broken.
-const MOST_SURFACES: usize = 1024;
+const MAX_SURFACES: usize = 1024;
 
 /// Returns the transmittance along a ray up to a distance, which may be infinite, and the number of rays that
 /// were traced for it. `media` holds the media at the ray's start; objects in `bulbs` do not block it.
@@ -59,7 +59,7 @@ pub(crate) fn transmittance(
     }
     let (mut left, mut rays) = (DVec3::ONE, 1);
     let (mut ray, mut travelled, mut media) = (*ray, 0.0, media.clone());
-    for _ in 0..MOST_SURFACES {
+    for _ in 0..MAX_SURFACES {
         rays += 1;
         let next = scene.geometry.closest(&ray, distance - travelled, |crossing| {
             open(crossing.object) && !bulbs.contains(&crossing.object)

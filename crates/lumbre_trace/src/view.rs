@@ -18,7 +18,7 @@ use crate::scene::Scene;
 
 /// Largest number of rays of one tree, shadow rays not counted. Glass within glass would multiply them
 /// without end; what is cut off is counted.
-const MOST_RAYS: u32 = 100_000;
+const MAX_RAYS: u32 = 100_000;
 
 /// The scene, the camera and the options of a picture.
 pub(crate) struct View {
@@ -59,7 +59,7 @@ impl View {
         let limits = Limits {
             depth: self.options.depth.unwrap_or(DEFAULT_DEPTH),
             weight: self.options.weight,
-            rays: MOST_RAYS,
+            rays: MAX_RAYS,
         };
         RayTree { scene: &self.scene, camera: &self.camera, limits, lighting }
     }

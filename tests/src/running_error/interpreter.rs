@@ -16,9 +16,9 @@ use super::Number;
 type Scalars = SmallVec<[Number; 4]>;
 
 /// Largest number of additional paths through the program that are followed where conditions are undecided.
-const MOST_WAYS: usize = 64;
+const MAX_WAYS: usize = 64;
 /// Largest number of iterations of a loop.
-const MOST_ROUNDS: usize = 4096;
+const MAX_ROUNDS: usize = 4096;
 
 /// A compiled kernel whose `evaluate` can be interpreted.
 #[derive(Debug)]
@@ -96,7 +96,7 @@ impl Program {
         let (mut open_ways, mut open_selects) = (0, ways.selects);
         while let Some(answers) = pending.pop() {
             open_ways += 1;
-            if open_ways > MOST_WAYS {
+            if open_ways > MAX_WAYS {
                 results.iter_mut().for_each(|result| result.error = f64::INFINITY);
                 break;
             }
@@ -208,7 +208,7 @@ impl Run<'_> {
                 }
                 Statement::Loop { body, continuing, break_if } => {
                     for round in 0.. {
-                        assert!(round < MOST_ROUNDS, "a loop does not end");
+                        assert!(round < MAX_ROUNDS, "a loop does not end");
                         match self.block(body, ways) {
                             Flow::Break => break,
                             Flow::Return(value) => return Flow::Return(value),

@@ -1,7 +1,7 @@
 //! Bounds of what is read from irradiance volumes.
 
 use glam::{DVec3, DVec4};
-use lumbre_optics::{self as optics, LEAST_OPENNESS};
+use lumbre_optics::{self as optics, MIN_OPENNESS};
 
 use super::{FLUSHED, U};
 
@@ -14,7 +14,7 @@ pub fn ambient_cube(normal: DVec3, sides: [DVec4; 3]) -> DVec3 {
         + DVec4::splat(6.0 * FLUSHED * (1.0 + sides.iter().map(|s| s.abs().max_element()).sum::<f64>()));
     let openness: f64 = (0..3).map(|axis| weights[axis] * sides[axis].w).sum();
     let result = optics::ambient_cube(normal, sides[0], sides[1], sides[2]).abs();
-    (of_sum.truncate() + result * of_sum.w) / openness.max(LEAST_OPENNESS)
+    (of_sum.truncate() + result * of_sum.w) / openness.max(MIN_OPENNESS)
         + 5.0 * U * result
         + DVec3::splat(FLUSHED)
 }

@@ -26,7 +26,7 @@ use crate::recording::STEPS_PER_SECOND;
 use crate::{Action, Input, Opened, Recording, Viewpoint};
 
 /// Largest number of devices that may be lost in a row without a frame being shown.
-const MOST_LOSSES: u32 = 3;
+const MAX_LOSSES: u32 = 3;
 /// Delay before the next attempt while the window shows nothing.
 const IDLE: Duration = Duration::from_millis(50);
 /// Frames to draw after all work has ended: the overlay lays out new text in the first and shows it in the
@@ -307,7 +307,7 @@ impl App {
     /// Creates a new device after one was lost.
     fn recover(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
         self.losses += 1;
-        if self.losses > MOST_LOSSES {
+        if self.losses > MAX_LOSSES {
             bail!("the graphics device was lost {} times in a row; see the driver's log", self.losses);
         }
         tracing::warn!("the graphics device is lost; making another one");

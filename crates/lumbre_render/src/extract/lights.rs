@@ -14,7 +14,7 @@ use super::light_records::{LightRecord, LightRecords};
 use super::shown_light::shown_light;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{InverseSquareLightData, LightData};
-use crate::shadow_light::{MOST_VIEWS, ShadowKind, ShadowLight, light_size};
+use crate::shadow_light::{MAX_VIEWS, ShadowKind, ShadowLight, light_size};
 use crate::{LightLists, RenderError};
 
 /// Largest number of inverse-square lights, besides a black one, in a uniform buffer of 64 KiB, which every
@@ -405,7 +405,7 @@ pub(crate) fn extract_lights(
             if shadow.is_none() && light.shadow {
                 let name = world.get::<Name>(*entity).map_or_else(|| entity.to_string(), ToString::to_string);
                 left_out.push(format!(
-                    "the shadow of light \"{name}\": shadows have room for {MOST_VIEWS} views, and a point light needs six"
+                    "the shadow of light \"{name}\": shadows have room for {MAX_VIEWS} views, and a point light needs six"
                 ));
             }
             data.push(record.data.with_shadow(shadow.as_ref().map_or(0, ShadowLight::flags)));

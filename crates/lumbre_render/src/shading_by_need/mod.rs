@@ -89,7 +89,7 @@ pub(crate) struct ShadingByNeed {
 }
 
 /// If more lights than this change in a frame, all predictions are dropped.
-const MOST_MOVED: usize = 128;
+const MAX_MOVED: usize = 128;
 
 #[derive(Debug)]
 struct Kept {
@@ -108,11 +108,11 @@ impl ShadingByNeed {
         self.moved.clear();
         if lamps.len() == self.lamps.len() {
             let moved = self.lamps.iter().zip(&lamps).filter(|(before, now)| before != now);
-            let moved = moved.take(MOST_MOVED + 1).flat_map(|(before, now)| [before.clone(), now.clone()]);
+            let moved = moved.take(MAX_MOVED + 1).flat_map(|(before, now)| [before.clone(), now.clone()]);
             self.moved.extend(moved);
         }
         let known = self.conditions == Some(conditions) && lamps.len() == self.lamps.len();
-        if !known || self.moved.len() > 2 * MOST_MOVED {
+        if !known || self.moved.len() > 2 * MAX_MOVED {
             self.kept.clear();
         } else if !self.moved.is_empty() {
             for (slot, object) in objects.iter() {

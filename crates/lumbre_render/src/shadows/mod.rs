@@ -13,12 +13,12 @@ use crate::extract::{CameraView, Object, Objects};
 use crate::growable_buffer::GrowableBuffer;
 use crate::mesh_buffers::{Attribute, MeshBuffers, MeshKey};
 use crate::shader::{self, TABLES_IN_TEXTURES};
-use crate::shadow_light::{MOST_VIEWS, ShadowKind, ShadowLight};
+use crate::shadow_light::{MAX_VIEWS, ShadowKind, ShadowLight};
 use crate::table_texture::table_binding;
 use crate::{Gpu, RenderError, Uploads};
 
 /// Largest side of the atlas, in texels.
-const MOST_TEXELS: u32 = 4096;
+const MAX_TEXELS: u32 = 4096;
 /// Stride of records that are bound at a dynamic offset: the largest alignment that WebGPU may require.
 const STRIDE: usize = 256;
 
@@ -181,7 +181,7 @@ impl ShadowMaps {
             found.extend(views::views(&lamp, &seen).into_iter().map(|view| (light, view)));
         }
         let wanted: Vec<f64> = found.iter().map(|(_, view)| view.wanted).collect();
-        let (side, tiles) = atlas::pack(&wanted, seen.most_texels(), MOST_TEXELS);
+        let (side, tiles) = atlas::pack(&wanted, seen.most_texels(), MAX_TEXELS);
         if side != self.side {
             self.side = side;
             self.drawn.clear();
@@ -217,7 +217,7 @@ impl ShadowMaps {
                 casters_of(objects, light, view, clip_from_frame, [tile.x, tile.y, tile.side]);
             if *drawn != shows {
                 *drawn = shows;
-                // Less than MOST_VIEWS strides.
+                // Less than MAX_VIEWS strides.
                 let matrix_offset = self.matrices.len() as u32;
                 self.matrices.extend_from_slice(bytemuck::bytes_of(&clip_from_frame.to_cols_array_2d()));
                 self.matrices.resize(matrix_offset as usize + STRIDE, 0);
@@ -465,7 +465,7 @@ impl OnDevice {
         });
         let matrices = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("shadow matrices"),
-            size: (MOST_VIEWS * STRIDE) as u64,
+            size: (MAX_VIEWS * STRIDE) as u64,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });

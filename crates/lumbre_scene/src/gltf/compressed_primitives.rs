@@ -152,7 +152,7 @@ fn decode_one(
     }
     let refused = |problem| LoadProblem::Compressed { place: place.to_owned(), problem };
     let points = points.unwrap_or_default();
-    budget.charge(points, draco::MOST_BYTES_PER_POINT, || place.to_owned())?;
+    budget.charge(points, draco::MAX_BYTES_PER_POINT, || place.to_owned())?;
     let mesh = draco::decode(bytes, points, corners / 3).map_err(refused)?;
     if mesh.points() as u64 != points || mesh.triangles() as u64 * 3 != corners {
         let (points, triangles) = (mesh.points(), mesh.triangles());

@@ -5,7 +5,7 @@
 
 /// Largest total size in bytes of the attributes of a vertex, including those the glTF file does not refer
 /// to: sixteen attributes of four floats.
-pub(crate) const MOST_BYTES_PER_POINT: usize = 16 * 16;
+pub(crate) const MAX_BYTES_PER_POINT: usize = 16 * 16;
 
 #[cfg(feature = "draco")]
 pub(crate) use with_decoder::decode;
@@ -16,7 +16,7 @@ pub(crate) use without_decoder::decode;
 mod with_decoder {
     use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
 
-    use super::MOST_BYTES_PER_POINT;
+    use super::MAX_BYTES_PER_POINT;
     use crate::gltf::accessor_format::{
         BYTE, FLOAT, Format, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT,
     };
@@ -31,7 +31,7 @@ mod with_decoder {
         let limits = DecodeLimits::default()
             .with_max_points(points)
             .with_max_faces(triangles)
-            .with_max_decoded_bytes(points.saturating_mul(MOST_BYTES_PER_POINT as u64));
+            .with_max_decoded_bytes(points.saturating_mul(MAX_BYTES_PER_POINT as u64));
         let decode = || {
             let mut buffer = DecoderBuffer::new(bytes).with_limits(limits);
             let mut mesh = Mesh::new();

@@ -23,7 +23,7 @@ use crate::{Image, Mipmap, Sampler, TextureReference, Wrap};
 
 /// Most texels that one byte of a PNG or JPEG can represent: deflate expands at most 1032 times, and a texel
 /// has at least one bit. A JPEG block of 64 texels takes at least one bit.
-const MOST_TEXELS_PER_BYTE: u64 = 8 * 1032;
+const MAX_TEXELS_PER_BYTE: u64 = 8 * 1032;
 
 /// Number of texels that an image may claim whatever its size in bytes: an image of a single colour takes
 /// next to no bytes as WebP or ETC1S.
@@ -296,7 +296,7 @@ fn decode_common(
     let first = reader()?;
     let is_webp = first.format() == Some(ImageFormat::WebP);
     let size = first.into_dimensions().map_err(|error| undecodable(error.to_string()))?;
-    let mut most_texels = MOST_TEXELS_PER_BYTE.saturating_mul(bytes.len() as u64);
+    let mut most_texels = MAX_TEXELS_PER_BYTE.saturating_mul(bytes.len() as u64);
     if is_webp {
         most_texels = most_texels.max(TEXELS_OF_ANY_IMAGE);
     }

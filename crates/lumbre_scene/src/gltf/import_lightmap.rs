@@ -17,7 +17,7 @@ use crate::{Lightmap, LightmapEncoding, LightmapImage};
 
 /// Most texels per byte of an OpenEXR file: zlib expands at most 1032 times, and a texel of three halves has
 /// six bytes.
-const MOST_TEXELS_PER_BYTE: u64 = 1032 / 6;
+const MAX_TEXELS_PER_BYTE: u64 = 1032 / 6;
 
 /// The lightmaps of a file; each image is read once.
 #[derive(Default)]
@@ -116,7 +116,7 @@ fn decode_open_exr(
         OpenExrDecoder::with_alpha_preference(Cursor::new(bytes), Some(false)).map_err(undecodable)?;
     let (width, height) = decoder.dimensions();
     let texels = u64::from(width) * u64::from(height);
-    let possible = MOST_TEXELS_PER_BYTE.saturating_mul(bytes.len() as u64);
+    let possible = MAX_TEXELS_PER_BYTE.saturating_mul(bytes.len() as u64);
     if texels == 0 || texels > possible || width.max(height) > limits.image_side {
         let (side, length) = (limits.image_side, bytes.len());
         return Err(refused(format!(

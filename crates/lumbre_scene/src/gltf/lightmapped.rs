@@ -19,7 +19,7 @@ use super::vertex_data::{NewData, Normals, Vertices};
 
 /// If fewer than one in this many vertices is used, the unused ones are dropped: primitives may share one
 /// large list.
-const LEAST_USED: usize = 4;
+const MIN_USED: usize = 4;
 
 /// Primitives being changed, and what was written for them already.
 pub(crate) struct Primitives<'a> {
@@ -352,7 +352,7 @@ fn split(corners: &[u32], made: &TriangleMesh, count: usize) -> Split {
     }
     let used = first.iter().flatten().count();
     let mut complete = true;
-    if used.saturating_mul(LEAST_USED) < count {
+    if used.saturating_mul(MIN_USED) < count {
         complete = false;
         let is_used = |vertex: usize| vertex >= count || first[vertex].is_some();
         let mut place = vec![0; sources.len()];

@@ -4,7 +4,7 @@ use super::ktx2::{HEADER_BYTES, IDENTIFIER, LEVEL_BYTES, ORIENTATION_KEY, part, 
 use super::{Ktx2Error, Ktx2Texture, PackedFormat, Supercompression, zstandard};
 
 /// Most texels per byte of a Zstandard frame: a block of four bytes can expand to 128 KiB.
-const MOST_TEXELS_PER_BYTE: u64 = (128 << 10) / 4 / 4;
+const MAX_TEXELS_PER_BYTE: u64 = (128 << 10) / 4 / 4;
 
 /// The validated header of a file, available before any texel is decompressed.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +80,7 @@ impl<'a> Header<'a> {
                 return wrong("byteLength", length, unpacked.to_string());
             }
             Supercompression::None => texels,
-            Supercompression::Zstandard => length.saturating_mul(MOST_TEXELS_PER_BYTE),
+            Supercompression::Zstandard => length.saturating_mul(MAX_TEXELS_PER_BYTE),
         };
         if texels > possible || usize::try_from(unpacked).is_err() {
             return wrong("byteLength", length, format!("enough for {texels} texels"));

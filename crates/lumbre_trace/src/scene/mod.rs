@@ -56,7 +56,7 @@ struct Passable {
 /// as in a frame.
 const FAR: f64 = 512.0;
 /// Largest number of triangles that the hierarchy can index.
-const MOST_TRIANGLES: usize = 1 << 29;
+const MAX_TRIANGLES: usize = 1 << 29;
 
 impl Scene {
     /// Reads a World whose global transforms are up to date, for an eye. `baked_light` says whether lightmaps
@@ -72,7 +72,7 @@ impl Scene {
         let exact = |index: usize| collected.quadrics.iter().any(|(own, _)| *own == index);
         let mut triangles = Vec::new();
         for (index, object) in collected.objects.iter().enumerate().filter(|(index, _)| !exact(*index)) {
-            if triangles.len() + object.shape.triangle_count() > MOST_TRIANGLES {
+            if triangles.len() + object.shape.triangle_count() > MAX_TRIANGLES {
                 let triangles = triangles.len() + object.shape.triangle_count();
                 return Err(TraceError::TooManyTriangles { triangles });
             }
