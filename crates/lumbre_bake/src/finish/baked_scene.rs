@@ -1,4 +1,5 @@
-//! What a bake has made, as plain data: maps, meshes with the coordinates to read them by, probes. Not how they get into a World: that is `apply`.
+//! What a bake has made, as plain data: maps, meshes with the coordinates to read them by, probes. Not how they get
+//! into a World: that is `apply`.
 
 use std::collections::HashSet;
 use std::f32::consts::PI;
@@ -28,7 +29,8 @@ pub struct BakedScene {
     pub volume: Option<(Transform, IrradianceVolume)>,
     /// What was done, what it cost and how good it is.
     pub report: BakeReport,
-    /// For [`Bake::former`](crate::Bake::former) of the next time, if they were asked for and there was something to keep.
+    /// For [`Bake::former`](crate::Bake::former) of the next time, if they were asked for and there was something to
+    /// keep.
     pub samples: Option<Samples>,
 }
 
@@ -56,8 +58,9 @@ pub struct BakedMap {
     pub separate: Option<SeparateLight>,
 }
 
-/// How far each texel of an entity's [`Lightmap`](lumbre_scene::Lightmap) may be off: one standard error in the map's own unit (E/π, mean of the
-/// channels), row by row; NaN where the map shows no surface. Against a converged bake of the same map at least 95 % of the texels are within two.
+/// How far each texel of an entity's [`Lightmap`](lumbre_scene::Lightmap) may be off: one standard error in the map's
+/// own unit (E/π, mean of the channels), row by row; NaN where the map shows no surface. Against a converged bake of
+/// the same map at least 95 % of the texels are within two.
 #[derive(Component, Clone, Debug)]
 pub struct TexelErrors(pub Arc<[f32]>);
 

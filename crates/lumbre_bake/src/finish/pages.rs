@@ -1,5 +1,5 @@
-//! Atlases: the maps of several objects on pages of at most N x N texels, when asked for. Only where they go and how their
-//! coordinates follow: the light is baked map by map, before.
+//! Atlases: the maps of several objects on pages of at most N x N texels, when asked for. Only where they go and how
+//! their coordinates follow: the light is baked map by map, before.
 //!
 //! Around every map its border texels are repeated, so that filtering up to the border reads what a map of its own,
 //! clamped, would show.
@@ -41,8 +41,8 @@ pub(crate) struct Pages {
 }
 
 impl Pages {
-    /// Puts the maps that fit on pages of at most `side` texels each way; `gap` free texels would part two maps. A map that is
-    /// larger, or would be alone on its page, keeps its own.
+    /// Puts the maps that fit on pages of at most `side` texels each way; `gap` free texels would part two maps. A map
+    /// that is larger, or would be alone on its page, keeps its own.
     pub fn new(layout: &LightmapLayout, side: Option<u32>, gap: u32) -> Self {
         let own = Self { places: vec![None; layout.maps.len()], ..Self::default() };
         let Some(side) = side else { return own };
