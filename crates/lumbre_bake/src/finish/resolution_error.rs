@@ -129,8 +129,8 @@ impl PointBaker<'_> {
             point.rays += u64::from(light.rays);
         }
         let Some(cache) = self.cache else { return point };
-        // A texel of this one point. It is the only one of its object, so it shares its samples with no texel of the
-        // map.
+        // A texel of this one point, with an object number and a seed of its own, so that it shares its samples with no
+        // other.
         let footprint = Footprint::Points(vec![footprint]);
         let texel = Texel { index: MapTexel(index), object: index, x: 0, y: 0, triangle, footprint };
         let mut gathered = GatherSums::default();
