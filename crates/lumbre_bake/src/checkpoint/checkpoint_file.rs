@@ -1,6 +1,5 @@
-//! The file of a checkpoint: read to its end first, written from there on. Not what its values mean.
+//! The file of a checkpoint: it is first read to its end, and then written from there on. Not what its values mean.
 
-use std::ffi::OsString;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -9,6 +8,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::record::{self, Record};
+use super::replace_file::replace_file;
 use super::{Checkpoint, VERSION};
 use crate::content_hash::ContentHash;
 use crate::error::CheckpointError;
@@ -16,56 +16,59 @@ use crate::error::CheckpointError;
 const MAGIC: &[u8; 8] = b"LUMBRECP";
 const CHECKSUM: usize = 32;
 const HEADER: usize = 8 + 4 + 32 + CHECKSUM;
-/// More than this does not wait for the interval.
+/// Bytes beyond which pending blocks are written without waiting for the interval.
 const MAX_PENDING: usize = 64 << 20;
-/// Writing may take one part in so many of the time.
-const SHARE: u32 = 20;
+/// The interval is at least this many times as long as a write takes.
+const MIN_INTERVAL_IN_WRITES: u32 = 20;
 
-/// Which values of which list a block holds.
+/// Identifies the values that a block holds: which part of which list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct ChunkKey {
     /// The stage, by its place in the order.
     pub stage: u8,
-    /// Values of the whole list.
+    /// How many values the whole list has.
     pub of: usize,
-    /// The first that is here.
+    /// Index of the first value in this block.
     pub start: usize,
 }
 
-/// What a bake has computed so far, in a file.
+/// The file that keeps what a bake has computed so far; without one, nothing is kept.
 #[derive(Default)]
 pub(crate) struct CheckpointFile {
     open: Option<OpenCheckpoint>,
-    /// What the user should know, once each.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
-    /// Seconds of work that were taken from the file.
+    /// Seconds that the interrupted bake had taken by the last block that was read.
     pub resumed: f64,
 }
 
 struct OpenCheckpoint {
     file: File,
     path: PathBuf,
-    /// End of what is read or written, in the file.
+    /// Offset in the file up to which it has been read, or will be written with the pending bytes.
     end: u64,
-    /// Bytes of the file while it is being read; `None` when it is written.
+    /// Length of the file while it is being read; `None` once it is being written.
     reading: Option<u64>,
+    /// Checksum of the last block, which goes into that of the next.
     chain: [u8; CHECKSUM],
+    /// Blocks that have not been written yet.
     pending: Vec<u8>,
     interval: Duration,
+    /// When blocks were last written.
     written: Instant,
 }
 
 impl CheckpointFile {
-    /// Opens or begins a checkpoint.
+    /// Opens the checkpoint to be resumed, or begins a new one.
     pub fn open(checkpoint: &Checkpoint, identity: &ContentHash) -> Result<Self, CheckpointError> {
         let path = &checkpoint.path;
         let mut opened = Self::default();
-        let found = match std::fs::symlink_metadata(path) {
+        let existing = match std::fs::symlink_metadata(path) {
             Ok(_) => Some(open_existing(path)?),
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             Err(error) => return Err(unusable(error)),
         };
-        let kept = match found {
+        let resumed = match existing {
             None if checkpoint.resume => {
                 opened.warn(path, "there is no such checkpoint: baking from the start");
                 None
@@ -79,7 +82,7 @@ impl CheckpointFile {
             },
             _ => None,
         };
-        let (file, reading, chain) = match kept {
+        let (file, reading, chain) = match resumed {
             Some((file, length, chain)) => (file, Some(length), chain),
             None => {
                 let (file, chain) = begin(path, identity).map_err(unusable)?;
@@ -103,7 +106,8 @@ impl CheckpointFile {
         self.warnings.push(format!("{}: {what}", path.display()));
     }
 
-    /// The values that come next, if the file has them, and the seconds they had taken. An empty list: the time ran out here.
+    /// The values that come next, if the file has them, and the seconds that the interrupted bake had taken by then. An
+    /// empty list means that its time ran out here.
     pub fn next<T: Record>(&mut self, key: ChunkKey) -> Option<(Vec<T>, f64)> {
         let open = self.open.as_mut()?;
         let length = open.reading?;
@@ -118,29 +122,29 @@ impl CheckpointFile {
                 if let Err(why) = end {
                     self.warn(&path, &format!("{why}; going on with what comes before"));
                 }
-                self.cut();
+                self.truncate();
                 None
             }
         }
     }
 
-    /// Makes what was read the beginning of what is written.
-    fn cut(&mut self) {
+    /// Truncates the file to what has been read, so that it is written from there on.
+    fn truncate(&mut self) {
         let Some(open) = &mut self.open else { return };
         let end = open.end;
-        let cut = open.file.set_len(end).and_then(|()| open.file.seek(SeekFrom::Start(end)));
+        let truncated = open.file.set_len(end).and_then(|()| open.file.seek(SeekFrom::Start(end)));
         open.written = Instant::now();
-        if let Err(error) = cut {
+        if let Err(error) = truncated {
             self.give_up(&error);
         }
     }
 
-    /// Appends values. They reach the file when the interval is over.
+    /// Appends values. They are written to the file when the interval has passed.
     pub fn record<T: Record>(&mut self, key: ChunkKey, values: &[T], seconds: f64) {
         let Some(open) = &mut self.open else { return };
         if open.reading.take().is_some() {
-            // The list was not asked for in chunks from its start: what is left in the file is of no use.
-            self.cut();
+            // What is left in the file comes after values that it does not have, so it is of no use.
+            self.truncate();
         }
         let Some(open) = &mut self.open else { return };
         match record::written(&(key, seconds, values)) {
@@ -152,20 +156,20 @@ impl CheckpointFile {
         }
     }
 
-    /// Writes what waits.
+    /// Writes the pending blocks to the file.
     pub fn flush(&mut self) {
         let Some(open) = self.open.as_mut().filter(|open| !open.pending.is_empty()) else { return };
         let begun = Instant::now();
         let written = open.file.write_all(&open.pending).and_then(|()| open.file.sync_data());
         open.pending.clear();
         open.written = Instant::now();
-        open.interval = open.interval.max(begun.elapsed() * SHARE);
+        open.interval = open.interval.max(begun.elapsed() * MIN_INTERVAL_IN_WRITES);
         if let Err(error) = written {
             self.give_up(&error);
         }
     }
 
-    /// The bake is worth more than its checkpoint.
+    /// Goes on without a checkpoint, with a warning: a failing disk must not end the bake.
     fn give_up(&mut self, error: &io::Error) {
         if let Some(open) = self.open.take() {
             self.warn(
@@ -179,15 +183,18 @@ impl CheckpointFile {
 }
 
 impl OpenCheckpoint {
-    /// `Ok(None)` at the end of the file.
+    /// Reads the next block; `Ok(None)` at the end of the file.
+    ///
+    /// # Errors
+    /// Why the file cannot be read on.
     fn read_block<T: Record>(
         &mut self,
         length: u64,
         key: ChunkKey,
     ) -> Result<Option<(Vec<T>, f64)>, &'static str> {
-        const CUT: &str = "its last block is cut short";
+        const TRUNCATED: &str = "its last block is cut short";
         const DAMAGED: &str = "it is damaged: a checksum is wrong";
-        const OTHER: &str = "it holds other values than this bake computes";
+        const MISMATCH: &str = "it holds other values than this bake computes";
         let left = length - self.end;
         if left == 0 {
             return Ok(None);
@@ -196,13 +203,13 @@ impl OpenCheckpoint {
         let read =
             |file: &mut File, bytes: &mut [u8]| file.read_exact(bytes).map_err(|_| "it cannot be read on");
         if left < 8 {
-            return Err(CUT);
+            return Err(TRUNCATED);
         }
         read(&mut self.file, &mut size)?;
         let bytes = u64::from_le_bytes(size);
-        // What the file does not hold is not allocated.
+        // A damaged length must not allocate more than the file holds.
         if bytes > left - 8 || left - 8 - bytes < CHECKSUM as u64 {
-            return Err(CUT);
+            return Err(TRUNCATED);
         }
         let mut content = vec![0; bytes as usize];
         let mut checksum = [0; CHECKSUM];
@@ -212,10 +219,10 @@ impl OpenCheckpoint {
         if chain != checksum {
             return Err(DAMAGED);
         }
-        let (at, seconds, values): (ChunkKey, f64, Vec<T>) = record::read(&content).ok_or(OTHER)?;
-        let fits = at == key && values.len() <= key.of - key.start;
+        let (block_key, seconds, values): (ChunkKey, f64, Vec<T>) = record::read(&content).ok_or(MISMATCH)?;
+        let fits = block_key == key && values.len() <= key.of - key.start;
         if !(fits && seconds.is_finite() && seconds >= 0.0) {
-            return Err(OTHER);
+            return Err(MISMATCH);
         }
         self.chain = chain;
         self.end += 8 + bytes + CHECKSUM as u64;
@@ -231,6 +238,7 @@ impl OpenCheckpoint {
     }
 }
 
+/// The checksum of a block: of that of the block before and of its own content.
 fn chained(before: &[u8; CHECKSUM], content: &[u8]) -> [u8; CHECKSUM] {
     *blake3::Hasher::new().update(before).update(content).finalize().as_bytes()
 }
@@ -239,23 +247,9 @@ fn unusable(error: io::Error) -> CheckpointError {
     CheckpointError::Unusable { reason: error.to_string() }
 }
 
-/// The name under which a checkpoint is begun.
-pub(crate) fn temporary(path: &Path) -> PathBuf {
-    let mut name = OsString::from(path.file_name().unwrap_or_default());
-    name.push(".partial");
-    path.with_file_name(name)
-}
-
-pub(crate) fn remove_if_there(path: &Path) -> io::Result<()> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
-    }
-}
-
-/// A file that is there, ours, and nobody else's at the moment; and its bytes.
+/// Opens and locks an existing file if it is a checkpoint; returns it with its length.
 fn open_existing(path: &Path) -> Result<(File, u64), CheckpointError> {
-    // Opening a pipe would wait for ever.
+    // Opening a pipe would block forever.
     if !std::fs::metadata(path).map_err(unusable)?.is_file() {
         return Err(CheckpointError::Foreign);
     }
@@ -263,7 +257,7 @@ fn open_existing(path: &Path) -> Result<(File, u64), CheckpointError> {
     lock(&file)?;
     let mut magic = Vec::new();
     (&file).take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(unusable)?;
-    // A power failure may leave an empty file.
+    // A power failure may leave an empty file, or only the beginning of one.
     if !MAGIC.starts_with(&magic) {
         return Err(CheckpointError::Foreign);
     }
@@ -275,12 +269,15 @@ fn open_existing(path: &Path) -> Result<(File, u64), CheckpointError> {
 fn lock(file: &File) -> Result<(), CheckpointError> {
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err(CheckpointError::InUse),
-        // Some network folders know no locks; the bake need not fail for that.
+        // Some network file systems have no locks; the bake need not fail for that.
         _ => Ok(()),
     }
 }
 
-/// Checks whether a checkpoint is of this bake; says why not.
+/// Checks that a checkpoint belongs to this bake, and returns the checksum that its blocks' chain begins with.
+///
+/// # Errors
+/// Why it does not.
 fn read_header(file: File, identity: &ContentHash) -> Result<(File, [u8; CHECKSUM]), String> {
     let mut header = Vec::new();
     (&file).take(HEADER as u64).read_to_end(&mut header).map_err(|error| error.to_string())?;
@@ -305,24 +302,19 @@ fn read_header(file: File, identity: &ContentHash) -> Result<(File, [u8; CHECKSU
     Ok((file, *checksum))
 }
 
-/// A new checkpoint without blocks, whole under its name at once.
+/// A new checkpoint without blocks. Its header is complete before the file has its name.
 fn begin(path: &Path, identity: &ContentHash) -> io::Result<(File, [u8; CHECKSUM])> {
     let mut header = [MAGIC.as_slice(), &VERSION.to_le_bytes(), identity.bytes()].concat();
     let checksum = *blake3::hash(&header).as_bytes();
     header.extend_from_slice(&checksum);
-    let beside = temporary(path);
-    let begun = (|| {
-        let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(true).open(&beside)?;
+    let file = replace_file(path, |temporary| {
+        let mut file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(true).open(temporary)?;
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             return Err(io::Error::new(io::ErrorKind::ResourceBusy, "another bake is beginning it"));
         }
         file.write_all(&header)?;
-        std::fs::rename(&beside, path)?;
         Ok(file)
-    })();
-    if begun.is_err() {
-        // Nothing more can be done about a file that cannot be removed either; the first error is the one to tell.
-        let _ = remove_if_there(&beside);
-    }
-    Ok((begun?, checksum))
+    })?;
+    Ok((file, checksum))
 }

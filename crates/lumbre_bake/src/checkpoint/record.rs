@@ -1,9 +1,10 @@
-//! Values as bytes, in the format of postcard: numbers to the last bit, lists with their lengths before them. Not the file that they are written to.
+//! Values as bytes, in the format of postcard: numbers keep every bit, and lists are preceded by their lengths. Not the
+//! file that the bytes are written to.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Something that a checkpoint keeps. What is read is what was written, to the last bit.
+/// A value that a checkpoint can keep. It is read exactly as it was written, to the last bit.
 pub(crate) trait Record: Serialize + DeserializeOwned {}
 
 impl<T: Serialize + DeserializeOwned> Record for T {}
@@ -16,7 +17,8 @@ pub(crate) fn written(value: &impl Serialize) -> Result<Vec<u8>, postcard::Error
     postcard::to_stdvec(value)
 }
 
-/// The value whose bytes these are, all of them; `None` where they end too early or say what no bake writes. Nothing is allocated that they cannot hold.
+/// The value that all of these bytes together encode; `None` if they are too few, too many, or not what a bake writes.
+/// Never allocates more than they can hold.
 pub(crate) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
     let (value, rest) = postcard::take_from_bytes(bytes).ok()?;
     rest.is_empty().then_some(value)
@@ -55,7 +57,7 @@ mod tests {
         assert_eq!((again.rays, again.sampled, again.seen), (direct.rays, direct.sampled, direct.seen));
         assert_eq!((&cast_again.hits, cast_again.inside), (&cast.hits, cast.inside));
         assert_eq!((cast_again.missed, cast_again.count), (cast.missed, cast.count));
-        // Whatever is cut off or too much is missed.
+        // Bytes that are missing or left over are noticed.
         for end in 0..bytes.len() {
             assert!(read::<(Direct, PatchRayCounts)>(&bytes[..end]).is_none(), "{end}");
         }

@@ -185,10 +185,7 @@ impl Level<'_> {
                 }
                 walk.indirect += weight * grey(self.direct[place as usize].total());
             }
-            let position = surface.position(u, v);
-            let normal = surface.side_normal(side);
-            let origin = scene.off_surface(triangle, side, position);
-            at = Receiver { position, origin, geometric_normal: normal, normal };
+            at = Receiver::on_facet(scene, triangle, side, (u, v));
         }
         walk.in_gap = in_view == 0;
         walk

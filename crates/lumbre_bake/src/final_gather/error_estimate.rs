@@ -1,5 +1,6 @@
-//! The terms of a map's error that the final gather tells of itself: the spread of its replicates, and what patches have brought it. Not their sum:
-//! that is `error_ledger`; and not a comparison with a better bake: that is a test's.
+//! The bias that reading patches brings into the final gather, estimated from checks against real bounces. Not the
+//! other terms of a map's error, nor their sum: that is `error_ledger`; and not a comparison with a better bake: that
+//! is a test's.
 
 use crate::denoise::replicates::standard_error;
 use glam::{DVec3, Vec3};
@@ -10,35 +11,39 @@ use crate::denoise::neighbourhoods::Neighbourhoods;
 use crate::denoise::replicates::{Estimates, mean};
 use crate::final_gather::gather_sums::GatherSums;
 
-/// Texels around one over which checks are put together.
+/// Texels each way around a texel over which its neighbourhood's checks are pooled.
 const CHECK_RADIUS: usize = 3;
-/// A difference between patches and real bounces counts as known, and is taken away, where it is this many times its own error.
-const KNOWN: f64 = 3.0;
+/// A difference between patches and real bounces counts as known, and is subtracted, as far as it exceeds this many of
+/// its own standard errors.
+const SIGNIFICANT: f64 = 3.0;
 
-/// What reading patches instead of bouncing on has brought a texel.
+/// By how much reading patches instead of bouncing on has changed a texel's light.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PatchBias {
-    /// The part that is known: to be taken away.
+    /// The known part, which is to be subtracted.
     pub correction: Vec3,
     /// Square of what is left, mean of the channels.
     pub rest: f32,
-    /// As `rest`, and below zero where chance alone would make more: of a single texel that says nothing, but the mean of many is right.
+    /// As `rest`, but negative where chance alone would explain more than was found: it says nothing about a single
+    /// texel, but its mean over many is unbiased.
     pub expected: f32,
 }
 
-/// The same of one neighbourhood alone, its squares apart and perhaps negative.
+/// The same from the checks of one neighbourhood alone; its squares are kept apart, and may be negative.
 #[derive(Clone, Copy, Debug, Default)]
-struct Unsmoothed {
+struct LocalBias {
     correction: Vec3,
+    /// Square of the part that is not known.
     unknown: f32,
+    /// Square of what later bounces add.
     later: f32,
 }
 
-/// Steps each way, and texels of a step, over which squares of what is unknown are put together.
+/// The wider neighbourhood over which squares of the unknown part are pooled: steps each way, and texels of a step.
 const WIDER_STEPS: usize = 2;
 const WIDER_STEP: usize = 4;
 
-/// Checks put together.
+/// Sums over checks of patches against real bounces.
 #[derive(Clone, Copy, Default)]
 struct Checks {
     count: f64,
@@ -49,7 +54,7 @@ struct Checks {
 }
 
 impl Checks {
-    /// With the light by bounces that the checked texel's samples tell.
+    /// The checks of one texel, whose samples estimate `light` by bounces.
     fn of(gathered: &GatherSums, light: Vec3) -> Self {
         Self {
             count: f64::from(gathered.checks),
@@ -59,13 +64,13 @@ impl Checks {
         }
     }
 
-    /// In single precision.
+    /// As plain numbers in single precision, to be summed over neighbourhoods.
     fn numbers(&self) -> [f32; 8] {
         let ([r, g, b], light) = (self.difference.as_vec3().to_array(), self.light.as_vec3());
         [self.count as f32, r, g, b, self.square as f32, light.x, light.y, light.z]
     }
 
-    /// The sums of some.
+    /// From sums of such numbers.
     fn from_numbers([count, r, g, b, square, light @ ..]: [f32; 8]) -> Self {
         Self {
             count: f64::from(count),
@@ -82,24 +87,28 @@ impl Checks {
         self.light += other.light;
     }
 
-    /// The mean difference, beyond `expected` of it; how much of it is known, in [0, 1]; the square of what chance may have made of it.
-    fn known(&self, expected: DVec3) -> (DVec3, f64, f64) {
+    /// The mean difference beyond `expected`; the share of it that is known, in [0, 1]; and the variance of the mean
+    /// difference, which is the square that chance alone would give it.
+    fn difference_beyond(&self, expected: DVec3) -> (DVec3, f64, f64) {
         if self.count < 2.0 {
             return (DVec3::ZERO, 0.0, 0.0);
         }
         let mean = self.difference / self.count;
-        let grey = mean.element_sum() / 3.0;
-        let by_chance = (self.square / self.count - grey * grey).max(0.0) / self.count;
-        let beyond = mean - expected;
-        let squared = (beyond.element_sum() / 3.0).powi(2).max(f64::MIN_POSITIVE);
-        (beyond, (1.0 - KNOWN * KNOWN * by_chance / squared).max(0.0), by_chance)
+        let channel_mean = mean.element_sum() / 3.0;
+        let variance = (self.square / self.count - channel_mean * channel_mean).max(0.0) / self.count;
+        let excess = mean - expected;
+        let squared = (excess.element_sum() / 3.0).powi(2).max(f64::MIN_POSITIVE);
+        (excess, (1.0 - SIGNIFICANT * SIGNIFICANT * variance / squared).max(0.0), variance)
     }
 }
 
-/// The mean difference between patches and real bounces: of a map, in terms of its light by bounces, where many checks tell it well;
-/// and beyond that around each texel. The real bounces read patches too, one bounce later: of a difference d about d ρ/(1 - ρ)
-/// stays, with the scene's mean reflectance ρ. Samples that read a texel are not checked: the texel is a mean of samples that were, and so one
-/// bounce later, without d and with ρ times what else stays. Where a share s of a texel's samples read patches, s d is taken away, and of the rest s + (1 - s) ρ stays.
+/// The mean difference between patches and real bounces: that of a whole map, in proportion to its light by bounces,
+/// where many checks determine it well; and around each texel, what goes beyond that.
+///
+/// The real bounces read patches too, one bounce later: of a difference d they leave about d ρ/(1 - ρ), with the
+/// scene's mean reflectance ρ. Samples that read a texel are not checked: that texel is itself a mean of samples that
+/// were, and so one bounce later; d has been subtracted from it, and ρ times the rest remains. Where a share s of a
+/// texel's samples read patches, s d is subtracted, and the rest counts s + (1 - s) ρ times.
 pub(crate) fn patch_bias(
     neighbourhoods: &Neighbourhoods<'_>,
     texels: &[Texel],
@@ -107,58 +116,59 @@ pub(crate) fn patch_bias(
     raw: &[Estimates],
     reflectance: f64,
 ) -> Vec<PatchBias> {
-    let later = reflectance / (1.0 - reflectance);
+    let later_bounces = reflectance / (1.0 - reflectance);
     let maps = texels.iter().map(|texel| texel.object as usize + 1).max().unwrap_or(0);
-    let mut of_maps = vec![Checks::default(); maps];
-    let checked: Vec<Checks> =
-        gathered.par_iter().zip(raw).map(|(own, raw)| Checks::of(own, mean(raw))).collect();
-    for (texel, checked) in texels.iter().zip(&checked) {
-        of_maps[texel.object as usize].add(checked);
+    let mut map_checks = vec![Checks::default(); maps];
+    let texel_checks: Vec<Checks> =
+        gathered.par_iter().zip(raw).map(|(sums, raw)| Checks::of(sums, mean(raw))).collect();
+    for (texel, checks) in texels.iter().zip(&texel_checks) {
+        map_checks[texel.object as usize].add(checks);
     }
-    // Per unit of light by bounces.
-    let of_maps: Vec<DVec3> = of_maps
+    // The difference per unit of light by bounces.
+    let map_ratios: Vec<DVec3> = map_checks
         .iter()
         .map(|checks| {
-            let (mean, known, _) = checks.known(DVec3::ZERO);
+            let (mean, known, _) = checks.difference_beyond(DVec3::ZERO);
             known * mean * checks.count / checks.light.max(DVec3::splat(f64::MIN_POSITIVE))
         })
         .collect();
-    let around = |((texel, own), sums): ((&Texel, &GatherSums), [f32; 8])| {
-        let checks = Checks::from_numbers(sums);
+    let local_bias = |((texel, sums), numbers): ((&Texel, &GatherSums), [f32; 8])| {
+        let checks = Checks::from_numbers(numbers);
         if checks.count < 2.0 {
-            return Unsmoothed::default();
+            return LocalBias::default();
         }
-        let of_map = of_maps[texel.object as usize] * checks.light / checks.count;
-        let (beyond, known, by_chance) = checks.known(of_map);
-        let correction = of_map + known * beyond;
+        let of_map = map_ratios[texel.object as usize] * checks.light / checks.count;
+        let (excess, known, variance) = checks.difference_beyond(of_map);
+        let correction = of_map + known * excess;
         let square = |v: DVec3| (v.element_sum() / 3.0).powi(2);
-        let unknown = (1.0 - known).powi(2) * square(beyond) - by_chance;
-        // What is taken away has come by chance in part.
-        let unknown = unknown + known * known * by_chance;
+        let unknown = (1.0 - known).powi(2) * square(excess) - variance;
+        // The correction itself is partly chance.
+        let unknown = unknown + known * known * variance;
         let correction = if correction.is_finite() { correction } else { DVec3::ZERO };
-        let later = later.powi(2) * square(correction);
-        let share = 1.0 - own.texel_share();
-        let stays = (share + (1.0 - share) * reflectance).powi(2);
-        Unsmoothed {
-            correction: (share * correction).as_vec3(),
-            unknown: (stays * unknown) as f32,
-            later: (stays * later) as f32,
+        let later = later_bounces.powi(2) * square(correction);
+        let patch_share = 1.0 - sums.texel_share();
+        let remaining = (patch_share + (1.0 - patch_share) * reflectance).powi(2);
+        LocalBias {
+            correction: (patch_share * correction).as_vec3(),
+            unknown: (remaining * unknown) as f32,
+            later: (remaining * later) as f32,
         }
     };
-    let sums = neighbourhoods.sums(|index| checked[index].numbers(), CHECK_RADIUS, 1);
-    let alone: Vec<Unsmoothed> = texels.par_iter().zip(gathered).zip(sums).map(around).collect();
-    // One neighbourhood's checks tell the square of what is unknown by a single sample, which may be as good as nothing: others' tell it too.
-    // With one standard error of their mean, as what is to be known is how large it may be.
-    let numbers = |index: usize| [1.0, alone[index].unknown, alone[index].unknown.powi(2)];
+    let sums = neighbourhoods.sums(|index| texel_checks[index].numbers(), CHECK_RADIUS, 1);
+    let local: Vec<LocalBias> = texels.par_iter().zip(gathered).zip(sums).map(local_bias).collect();
+    // The checks of one neighbourhood give a single sample of the unknown part's square, which may be almost worthless,
+    // so other neighbourhoods' samples are averaged in. One standard error is added to their mean, as a cautious figure
+    // is wanted.
+    let numbers = |index: usize| [1.0, local[index].unknown, local[index].unknown.powi(2)];
     let sums = neighbourhoods.sums(numbers, WIDER_STEPS, WIDER_STEP);
-    let wider = |(sums, own): ([f32; 3], &Unsmoothed)| {
+    let pooled = |(sums, local): ([f32; 3], &LocalBias)| {
         let [count, sum, _] = sums;
-        let unknown = own.unknown.max(sum / count.max(1.0) + standard_error(sums));
+        let unknown = local.unknown.max(sum / count.max(1.0) + standard_error(sums));
         PatchBias {
-            correction: own.correction,
-            rest: unknown.max(0.0) + own.later,
-            expected: own.unknown + own.later,
+            correction: local.correction,
+            rest: unknown.max(0.0) + local.later,
+            expected: local.unknown + local.later,
         }
     };
-    sums.into_par_iter().zip(&alone).map(wider).collect()
+    sums.into_par_iter().zip(&local).map(pooled).collect()
 }

@@ -1,29 +1,35 @@
-//! Every term of a map's stated error, in one place, and their sum. Not how each of them is found: that is told where it is found, and
-//! `error_estimate` has those of the gather. All are squared, mean of the channels, per covered texel.
+//! Every term of a map's stated error in one place, and their sum. Not how each term is found: that is documented where
+//! it is found (see the table). All are squared errors, mean of the channels, per covered texel.
 //!
 //! ```text
-//!   term           what it is                                               found by                       in a whole map
-//!   ─────────────  ───────────────────────────────────────────────────────  ─────────────────────────────  ──────────────────────────
-//!   direct light   spread of batches of shadow samples                      transport::direct, shared_light without its caution
-//!   noise          spread of four replicates, after smoothing               error_estimate::spread         the neighbours' mean
-//!   smoothing      half of the replicates smoothed against the other raw    smoothing_bias                 as it is
-//!   form factors   half the difference of two half solutions, and to one    exchange and size_error        as it is
-//!                  with patches twice as large, read by the texel's rays    GatherSums::patch_error
-//!   texels read    what noise leaves in the texels that later rounds read,  gather                         as it is
-//!                  as far as it is correlated
-//!   patches        patches against real bounces, at some of the hits        error_estimate::patch_bias     without what chance added
-//!   solver         residual / (1 - rho) of the light by bounces             transport::solver              as it is
-//!   kept           by how much light kept of a former bake has changed      rebake::choice                 as it is
-//!   arithmetic     what cracks as wide as rounded coordinates let through   here                           as it is
+//!   term           what it is                                  found by                      over a whole map
+//!   ─────────────  ──────────────────────────────────────────  ────────────────────────────  ─────────────────────────
+//!   direct light   spread of batches of shadow samples         sources::irradiance,          without its caution
+//!                                                              direct_light::shared_light
+//!   noise          spread of four replicates, after smoothing  denoise::replicates::spread   the neighbours' mean
+//!   smoothing      smoothed half of the replicates against     denoise::smoothing_bias       the same
+//!                  the raw other half
+//!   form factors   half the difference of two half solutions,  radiosity::exchange and       the same
+//!                  and the difference to patches twice as      size_error, read by rays:
+//!                  large                                       GatherSums::patch_error
+//!   texels read    noise of the texels that later rounds       gather                        the same
+//!                  read, as far as it is correlated
+//!   patches        patches against real bounces, at some hits  error_estimate::patch_bias    without chance's part
+//!   solver         residual / (1 - rho) of light by bounces    radiosity::solver             the same
+//!   reused gather  possible change of light that is kept from  rebake::indirect_change       the same
+//!                  a former bake
+//!   arithmetic     light through cracks as wide as coordinates error_ledger                  the same
+//!                  are rounded
 //! ```
 //!
-//! The finished map states two things more, texel by texel, which no round can make smaller and the whole map's figure does not have: `fill` tells
-//! what the sum above leaves at a texel's centre, where its neighbours' slope brings it, and `seams` adds by how much a texel was moved.
+//! The finished map states two more errors texel by texel, which no round can reduce and which the whole map's figure
+//! does not contain: `finish::fill` moves values along their neighbours' slope to the texels' centres, which changes
+//! their error, and `finish::seams` adds by how much a texel was moved.
 //!
-//! Of a single texel a cautious figure is stated, of the whole map the expected one: cautious figures of many texels add up to far more than the map's
-//! error. The tests `honest_error` hold both against converged bakes.
+//! A cautious figure is stated for a single texel, the expected one for the whole map: the cautious figures of many
+//! texels add up to far more than the map's error. The tests `honest_error` compare both with converged bakes.
 //!
-//! Not in it: the map's own resolution, and what a penumbra hides that all samples of a texel and of its neighbours missed.
+//! Not included: the map's own resolution, and penumbrae that all samples of a texel and of its neighbours missed.
 
 use crate::squared_errors::SquaredErrors;
 use rayon::prelude::*;
@@ -37,30 +43,30 @@ use crate::direct_light::local_light::LocalLight;
 use crate::final_gather::gather_sums::GatherSums;
 use crate::sources::direct::Direct;
 
-/// What the gather leaves.
+/// The gather's results and errors, per covered texel.
 pub(crate) struct GatherErrors<'a> {
     pub gathered: &'a [GatherSums],
     pub estimates: &'a [Estimates],
-    /// Variance of the mean of each.
+    /// Variance of the mean of each texel's replicates.
     pub noise: &'a SquaredErrors,
     pub smoothing: &'a [f32],
     pub patches: &'a [PatchBias],
-    /// Relative, of the solver.
+    /// Bound of the solver's error, relative to the light by bounces.
     pub residual_bound: f64,
-    /// By how much the light may have changed since it was gathered; empty where none is kept.
+    /// By how much light kept from a former bake may have changed since, W/m²; empty where none is kept.
     pub kept: &'a [f32],
 }
 
-/// Everything that may be wrong with a map.
+/// What all terms of a map's error are computed from.
 pub(crate) struct ErrorLedger<'a> {
     pub direct: &'a [Direct],
-    /// None where nothing bounces.
+    /// `None` where nothing bounces.
     pub gather: Option<GatherErrors<'a>>,
-    /// Mean irradiance, W/m², of which cracks may let through.
+    /// Mean irradiance, W/m²: the light that cracks may let through.
     pub light: f32,
 }
 
-/// A kind of error.
+/// A term of the error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Term {
     DirectLight,
@@ -74,7 +80,8 @@ enum Term {
     Arithmetic,
 }
 
-/// Share of the mean light that is within the rounding of coordinates: sixteen of it, as where segments end.
+/// Share of the mean light that cracks may let through: sixteen roundings of a coordinate, as many as a segment's end
+/// is moved by.
 const ARITHMETIC: f32 = 16.0 / (1 << 24) as f32;
 
 impl Term {
@@ -106,7 +113,7 @@ impl Term {
 }
 
 impl<'a> ErrorLedger<'a> {
-    /// Of a map without bounces.
+    /// The ledger of a map without bounces.
     pub fn of_direct_light(direct: &'a DirectLight) -> Self {
         Self { direct: &direct.texels, gather: None, light: 0.0 }
     }
@@ -116,36 +123,37 @@ impl ErrorLedger<'_> {
     /// The sum of all terms, per covered texel.
     pub fn total(&self) -> SquaredErrors {
         let of_texel = |index: usize| {
-            let cautious = |term| self.of(term, index);
-            let read = cautious(Term::FormFactors) + cautious(Term::TexelsRead);
-            let [smoothing, solver, patches, kept] =
-                [Term::Smoothing, Term::Solver, Term::Patches, Term::ReusedGather].map(cautious);
-            let systematic = smoothing + read + solver + patches + kept;
-            let rest = cautious(Term::DirectLight) + systematic + cautious(Term::Arithmetic);
+            let stated = |term| self.stated(term, index);
+            let read = stated(Term::FormFactors) + stated(Term::TexelsRead);
+            let [smoothing, solver, patches, reused] =
+                [Term::Smoothing, Term::Solver, Term::Patches, Term::ReusedGather].map(stated);
+            let systematic = smoothing + read + solver + patches + reused;
+            let rest = stated(Term::DirectLight) + systematic + stated(Term::Arithmetic);
             let expected = self.expected(Term::Noise, index) + (rest - self.direct[index].caution);
-            (cautious(Term::Noise) + rest, expected)
+            (stated(Term::Noise) + rest, expected)
         };
         let (cautious, expected) = (0..self.direct.len()).into_par_iter().map(of_texel).unzip();
         SquaredErrors { cautious, expected }
     }
 
-    /// The part of each texel's error that more rays make smaller.
+    /// The part of each texel's error that more rays reduce.
     pub fn by_rays(&self) -> SquaredErrors {
         self.gather.as_ref().map_or_else(SquaredErrors::default, |gather| gather.noise.with(gather.smoothing))
     }
 
-    /// By how much the sum over texels of the expected total, relative to the light around them, is more than is expected of the map: in single texels
-    /// the patches' error has in it what chance adds, which falls out of their mean.
+    /// By how much the sum over texels of the expected total, relative to the light around them, exceeds what is
+    /// expected of the whole map: the patches' error of a single texel contains the effect of chance, which cancels in
+    /// the mean of many.
     pub fn by_chance(&self, texels: &[Texel], local: &LocalLight) -> f64 {
         let Some(gather) = &self.gather else { return 0.0 };
-        let of_patches = |part: fn(&PatchBias) -> f32| -> f64 {
-            let parts: Vec<f32> = gather.patches.iter().map(part).collect();
-            open_sum(texels, &local.relative(&parts))
+        let sum_of = |square: fn(&PatchBias) -> f32| -> f64 {
+            let squares: Vec<f32> = gather.patches.iter().map(square).collect();
+            open_sum(texels, &local.relative(&squares))
         };
-        of_patches(|bias| bias.rest) - of_patches(|bias| bias.expected).max(0.0)
+        sum_of(|bias| bias.rest) - sum_of(|bias| bias.expected).max(0.0)
     }
 
-    /// What the map's error is made of, the largest part first: their squares add up to that of the whole.
+    /// What the map's error is made of, the largest part first: the parts' squares add up to that of the whole.
     pub fn parts(&self, texels: &[Texel], local: &LocalLight) -> Vec<ErrorPart> {
         let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
         let by_chance = self.by_chance(texels, local);
@@ -161,8 +169,8 @@ impl ErrorLedger<'_> {
         parts
     }
 
-    /// As it is stated of one texel.
-    fn of(&self, term: Term, index: usize) -> f32 {
+    /// The squared error that is stated for a single texel.
+    fn stated(&self, term: Term, index: usize) -> f32 {
         match (term, &self.gather) {
             (Term::DirectLight, _) => self.direct[index].variance,
             (Term::Arithmetic, _) => (ARITHMETIC * self.light).powi(2),
@@ -177,27 +185,29 @@ impl ErrorLedger<'_> {
                     gather.residual_bound as f32 * mean(&gather.estimates[index]).element_sum() / 3.0;
                 unsolved * unsolved
             }
-            (Term::ReusedGather, Some(gather)) => gather.kept.get(index).map_or(0.0, |kept| kept * kept),
+            (Term::ReusedGather, Some(gather)) => {
+                gather.kept.get(index).map_or(0.0, |change| change * change)
+            }
         }
     }
 
-    /// As it is expected of one among many.
+    /// The squared error that is expected of a texel as one among many.
     fn expected(&self, term: Term, index: usize) -> f32 {
         match (term, &self.gather) {
             (Term::DirectLight, _) => self.direct[index].variance - self.direct[index].caution,
             (Term::Noise, Some(gather)) => gather.noise.expected[index],
-            _ => self.of(term, index),
+            _ => self.stated(term, index),
         }
     }
 }
 
-/// The sum over texels that show a surface.
+/// The sum over the texels that are not hidden.
 pub(crate) fn open_sum(texels: &[Texel], numbers: &[f32]) -> f64 {
     let open = texels.iter().zip(numbers).filter(|(texel, _)| !texel.is_hidden());
     open.map(|(_, number)| f64::from(*number)).sum()
 }
 
-/// The root of a squared error. Of what is no number nothing is known: that is no error of 0.
+/// The root of a squared error. Infinity for NaN: then nothing is known, which must not look like an error of 0.
 pub(crate) fn root(squared: f64) -> f64 {
     if squared.is_nan() { f64::INFINITY } else { squared.max(0.0).sqrt() }
 }
@@ -212,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_number_is_no_error_of_zero() {
+    fn nan_is_not_an_error_of_zero() {
         assert_eq!((root(f64::NAN), root(-1e-30), root(4.0)), (f64::INFINITY, 0.0, 2.0));
         assert_eq!((relative_to(2.0, f64::NAN), relative_to(2.0, 16.0)), (f64::INFINITY, 2.0));
         assert_eq!(relative_to(0.0, 16.0), 0.0);

@@ -1,6 +1,8 @@
-//! The final gather: rays from every texel read the light that leaves what they meet. Direct light there is that of
-//! the texel hit. From the second round on earlier bounces are read from that texel, too; in the first round they come from its patch, and where a
-//! patch is too coarse for so near a hit the ray goes on. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `incident`.
+//! The samples of the final gather: rays from every texel read the light that leaves the surfaces they hit. Direct
+//! light is read from the texel that was hit. The light of earlier bounces is read from that texel, too, from the
+//! second round on; in the first round it is read from the patch that was hit, and where that patch is too coarse for
+//! so near a hit, the path makes another bounce instead. Emission is not read: `direct_light` has already counted it.
+//! Not where rays go and what they hit: that is `incident`.
 
 use crate::denoise::replicates::REPLICATES;
 use crate::final_gather::gather_sums::GatherSums;
@@ -17,35 +19,36 @@ use crate::sampling::Stream;
 use crate::scene::Receiver;
 use crate::scene::material::Side;
 
-/// One in so many samples asks a real bounce beside the patch that it reads.
-pub(crate) const CHECKED: u32 = 4;
+/// One in this many samples also traces a real bounce, to check the patch that it reads.
+const CHECK_INTERVAL: u32 = 4;
 
-/// Most real bounces that one ray makes between surfaces too near for patches.
+/// Most real bounces that one path makes between surfaces too near to each other for patches.
 const NEAR_BOUNCES: u32 = 6;
 
-/// Samples that are followed together: what they read is then on its way from memory at the same time.
+/// Samples that are followed together, so that what they read is on its way from memory at the same time.
 const BATCH: usize = 16;
 
-/// Samples to follow, each with what tells it from others, and how far they are.
-struct Batch<Name> {
+/// Samples to follow, each with a tag that identifies it, and their results.
+struct Batch<Tag> {
     requests: [GatherRequest; BATCH],
-    names: [Name; BATCH],
+    tags: [Tag; BATCH],
     count: usize,
     paths: [SamplePath; BATCH],
-    found: [IncidentSample; BATCH],
+    results: [IncidentSample; BATCH],
 }
 
-/// A batch of samples and one of those that check them.
+/// A batch of samples, and the batch of real bounces that check them.
 struct Batches {
-    /// By replicate and number of the sample.
+    /// Tagged with replicate and sample number.
     samples: Batch<(usize, u32)>,
     contributions: [GatherContribution; BATCH],
-    /// By place of the sample and the patch that it read.
+    /// Tagged with the slot of the sample in its batch, and the patch that the sample read.
     checks: Batch<(usize, PatchIndex)>,
 }
 
 thread_local! {
-    /// ReusedGather, as to clear them for every texel takes as long as some of its rays. What a batch leaves in them nothing reads.
+    /// Reused, since clearing them for every texel takes as long as some of its rays. Nothing reads what an earlier
+    /// batch left.
     static BATCHES: RefCell<Batches> = const {
         RefCell::new(Batches {
             samples: Batch::empty((0, 0)),
@@ -55,41 +58,42 @@ thread_local! {
     };
 }
 
-impl<Name: Copy> Batch<Name> {
-    const fn empty(name: Name) -> Self {
+impl<Tag: Copy> Batch<Tag> {
+    const fn empty(tag: Tag) -> Self {
         Self {
             requests: [GatherRequest::NOWHERE; BATCH],
-            names: [name; BATCH],
+            tags: [tag; BATCH],
             count: 0,
             paths: [SamplePath::NONE; BATCH],
-            found: [IncidentSample::NOTHING; BATCH],
+            results: [IncidentSample::NOTHING; BATCH],
         }
     }
 
-    fn push(&mut self, request: GatherRequest, name: Name) {
+    fn push(&mut self, request: GatherRequest, tag: Tag) {
         self.requests[self.count] = request;
-        self.names[self.count] = name;
+        self.tags[self.count] = tag;
         self.count += 1;
     }
 
     fn follow(&mut self, cache: &RadianceCache<'_>) {
-        cache.incident(&self.requests[..self.count], &mut self.paths, &mut self.found);
+        cache.incident(&self.requests[..self.count], &mut self.paths, &mut self.results);
     }
 }
 
-/// What one sample of the gather found.
+/// What one sample adds to a texel's sums.
 #[derive(Clone, Copy)]
 struct GatherContribution {
     light: Vec3,
     weight: f32,
-    /// What the patches' errors leave in it.
+    /// The patches' errors in `light`, each with its sign.
     error: Vec2,
-    /// The variance that this sample adds since the light of the texel that it read is itself uncertain.
+    /// The variance in `light` that comes from the uncertain light of the texel that was read.
     texel_variance: f32,
-    /// Whether the light of a texel was read, and not a patch's.
-    of_texel: bool,
-    /// Whether the patch that was read was checked, and by how much it is more than the real bounce.
-    checked: bool,
+    /// Whether the light of a texel was read, not that of a patch.
+    reads_texel: bool,
+    /// Whether the patch that was read is checked against a real bounce.
+    is_checked: bool,
+    /// By how much the patch gives more light than the real bounce; before the check has run, the weight of that.
     difference: Vec3,
     /// Rays beyond the first.
     rays: u32,
@@ -101,15 +105,15 @@ impl GatherContribution {
         weight: 0.0,
         error: Vec2::ZERO,
         texel_variance: 0.0,
-        of_texel: false,
-        checked: false,
+        reads_texel: false,
+        is_checked: false,
         difference: Vec3::ZERO,
         rays: 0,
     };
 }
 
 impl RadianceCache<'_> {
-    /// Adds samples `self.samples..samples` of every replicate.
+    /// Adds the samples `gathered.samples..samples` of every replicate.
     pub fn gather(&self, texel: &Texel, gathered: &mut GatherSums, samples: u32, seed: u32) {
         BATCHES.with_borrow_mut(|batches| self.gather_with(batches, texel, gathered, samples, seed));
     }
@@ -122,14 +126,14 @@ impl RadianceCache<'_> {
         samples: u32,
         seed: u32,
     ) {
-        let from = gathered.samples;
+        let first = gathered.samples;
         let sequences: [TileSequence; REPLICATES] = std::array::from_fn(|replicate| {
-            TileSequence::new(seed, Stream::Gather(replicate as u32), texel, self.run)
+            TileSequence::new(seed, Stream::Gather(replicate as u32), texel, self.first_round_samples)
         });
-        let numbers =
-            (0..REPLICATES).flat_map(|replicate| (from..samples).map(move |sample| (replicate, sample)));
+        let tags =
+            (0..REPLICATES).flat_map(|replicate| (first..samples).map(move |sample| (replicate, sample)));
         batches.samples.count = 0;
-        for (replicate, sample) in numbers {
+        for (replicate, sample) in tags {
             let [x, y, u, v] = sequences[replicate].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
                 let region = self.guide.region_at(point.triangle, Side::Front, point.at);
@@ -141,10 +145,10 @@ impl RadianceCache<'_> {
             }
         }
         self.gather_batch(texel, &sequences, batches, gathered);
-        gathered.samples = from.max(samples);
+        gathered.samples = first.max(samples);
     }
 
-    /// Adds some samples, and empties their list.
+    /// Follows the samples of a batch, adds what they find to the sums, and empties the batch.
     fn gather_batch(
         &self,
         texel: &Texel,
@@ -154,97 +158,107 @@ impl RadianceCache<'_> {
     ) {
         samples.follow(self);
         checks.count = 0;
-        let names = &samples.names[..samples.count];
-        for (place, (found, &(replicate, sample))) in samples.found.iter().zip(names).enumerate() {
-            let reading = &mut contributions[place];
-            *reading =
-                GatherContribution { light: found.light, weight: found.weight, ..GatherContribution::NONE };
-            let Some(hit) = &found.hit else { continue };
-            gathered.inverse_distances += found.weight / hit.distance.max(f32::MIN_POSITIVE);
-            // In turn over replicates, samples and texels, so that every neighbourhood has some at any number of samples.
+        let tags = &samples.tags[..samples.count];
+        for (slot, (incident, &(replicate, sample))) in samples.results.iter().zip(tags).enumerate() {
+            let contribution = &mut contributions[slot];
+            *contribution = GatherContribution {
+                light: incident.light,
+                weight: incident.weight,
+                ..GatherContribution::NONE
+            };
+            let Some(hit) = &incident.hit else { continue };
+            gathered.inverse_distances += incident.weight / hit.distance.max(f32::MIN_POSITIVE);
+            // Takes turns over replicates, samples and texels: every neighbourhood gets checks, however few samples
+            // there are.
             let turn =
                 (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.0.wrapping_mul(7));
-            reading.checked = turn.is_multiple_of(CHECKED);
-            let receiver = &samples.requests[place].receiver;
-            let last = self.read(receiver, hit, &sequences[replicate], sample, reading);
-            if let Some(last) = last.filter(|_| reading.checked) {
+            contribution.is_checked = turn.is_multiple_of(CHECK_INTERVAL);
+            let receiver = &samples.requests[slot].receiver;
+            let last = self.read(receiver, hit, &sequences[replicate], sample, contribution);
+            if let Some(last) = last.filter(|_| contribution.is_checked) {
                 let [u, v, ..] = sequences[replicate].point(sample, 1);
                 let region = self.guide.region_at(last.triangle, last.side, last.at);
                 let request = GatherRequest { receiver: self.receiver_at(&last), region, u, v };
-                checks.push(request, (place, last.patch));
+                checks.push(request, (slot, last.patch));
             }
         }
         checks.follow(self);
-        for (found, &(place, patch)) in checks.found.iter().zip(&checks.names[..checks.count]) {
-            let leaving = |hit: &Hit| found.weight * hit.reflectance * (hit.direct + hit.indirect);
-            let real = found.hit.as_ref().map_or(found.light, leaving);
-            contributions[place].rays += 1;
-            contributions[place].difference *= self.patch_indirect[patch.place()] - real;
+        for (incident, &(slot, patch)) in checks.results.iter().zip(&checks.tags[..checks.count]) {
+            let leaving = |hit: &Hit| incident.weight * hit.reflectance * (hit.direct + hit.indirect);
+            let real_bounce = incident.hit.as_ref().map_or(incident.light, leaving);
+            contributions[slot].rays += 1;
+            contributions[slot].difference *= self.patch_indirect[patch.place()] - real_bounce;
         }
-        for (reading, &(replicate, _)) in contributions.iter().zip(names) {
-            gathered.sums[replicate] += reading.light;
-            gathered.weights[replicate].add(reading.weight, reading.light);
-            gathered.rays += 1 + u64::from(reading.rays);
-            gathered.patch_errors += reading.error;
-            gathered.texel_variances += reading.texel_variance;
-            gathered.texel_reads += u32::from(reading.of_texel);
-            gathered.checks += u32::from(reading.checked);
-            gathered.differences += reading.difference;
-            gathered.squared_differences += (reading.difference.element_sum() / 3.0).powi(2);
+        for (contribution, &(replicate, _)) in contributions.iter().zip(tags) {
+            gathered.sums[replicate] += contribution.light;
+            gathered.weights[replicate].add(contribution.weight, contribution.light);
+            gathered.rays += 1 + u64::from(contribution.rays);
+            gathered.patch_errors += contribution.error;
+            gathered.texel_variances += contribution.texel_variance;
+            gathered.texel_reads += u32::from(contribution.reads_texel);
+            gathered.checks += u32::from(contribution.is_checked);
+            gathered.differences += contribution.difference;
+            gathered.squared_differences += (contribution.difference.element_sum() / 3.0).powi(2);
         }
         samples.count = 0;
     }
 
-    /// The light that leaves a point that was met, emission apart, times a weight. Returns the surface whose patch was read, if one was; the
-    /// difference of that to a real bounce is then still to be multiplied by it. Where a texel was read instead, there is nothing to check.
+    /// Reads the light, without emission, that leaves the surface a sample hit, times the sample's weight, into
+    /// `contribution`.
+    ///
+    /// Returns the surface whose patch was read, if one was. Where that patch is to be checked,
+    /// `contribution.difference` is then the weight of the difference between the patch and a real bounce. Where a
+    /// texel was read instead, there is nothing to check.
     fn read(
         &self,
         receiver: &Receiver,
         hit: &Hit,
         sequence: &TileSequence,
         sample: u32,
-        reading: &mut GatherContribution,
+        contribution: &mut GatherContribution,
     ) -> Option<Hit> {
-        let mut weight = reading.weight * hit.reflectance;
+        let mut weight = contribution.weight * hit.reflectance;
         let (mut light, mut last) = (weight * hit.direct, *hit);
         let mut receiver = *receiver;
-        // In a gap narrower than patches there may be many.
+        // In a gap narrower than patches a path may bounce many times.
         for bounce in 0..NEAR_BOUNCES {
-            let is_coarse = last.variance.is_none() && last.distance < self.near[last.patch.place()];
+            let is_coarse =
+                last.variance.is_none() && last.distance < self.min_read_distance[last.patch.place()];
             if !is_coarse || weight == Vec3::ZERO {
                 break;
             }
             let [u, v, ..] = sequence.point(sample, 2 + bounce);
-            reading.rays += 1;
+            contribution.rays += 1;
             receiver = self.receiver_at(&last);
             let request = GatherRequest { receiver, region: None, u, v };
-            let mut found = [IncidentSample::NOTHING];
-            self.incident(&[request], &mut [SamplePath::NONE], &mut found);
-            let [found] = found;
-            let Some(hit) = found.hit else {
-                reading.light = light + weight * found.light;
+            let mut incident = [IncidentSample::NOTHING];
+            self.incident(&[request], &mut [SamplePath::NONE], &mut incident);
+            let [incident] = incident;
+            let Some(hit) = incident.hit else {
+                contribution.light = light + weight * incident.light;
                 return None;
             };
-            weight *= found.weight * hit.reflectance;
+            weight *= incident.weight * hit.reflectance;
             light += weight * hit.direct;
             last = hit;
         }
-        reading.light = light + weight * last.indirect;
-        let grey = weight.element_sum() / 3.0;
+        contribution.light = light + weight * last.indirect;
+        let mean_weight = weight.element_sum() / 3.0;
         if let Some(variance) = last.variance {
-            // Errors within a disc about the hit are correlated: the share of cosine rays that land in it is its form factor.
+            // Errors within a disc about the hit are correlated. The share of cosine rays that land in it is its form
+            // factor.
             let normal = self.scene.triangles[last.triangle as usize].side_normal(last.side);
             let cosines = -last.direction.dot(normal) * last.direction.dot(receiver.normal);
-            let under = self.correlated / last.distance.max(f32::MIN_POSITIVE);
-            let share = (cosines.max(0.0) * under * under).min(1.0);
-            reading.texel_variance = share * grey * grey * variance;
-            reading.error = last.error * grey;
-            (reading.of_texel, reading.checked) = (true, false);
+            let radius = self.correlation_radius / last.distance.max(f32::MIN_POSITIVE);
+            let form_factor = (cosines.max(0.0) * radius * radius).min(1.0);
+            contribution.texel_variance = form_factor * mean_weight * mean_weight * variance;
+            contribution.error = last.error * mean_weight;
+            (contribution.reads_texel, contribution.is_checked) = (true, false);
             return None;
         }
-        reading.error = last.error * grey;
-        if reading.checked {
-            reading.difference = weight;
+        contribution.error = last.error * mean_weight;
+        if contribution.is_checked {
+            contribution.difference = weight;
         }
         Some(last)
     }

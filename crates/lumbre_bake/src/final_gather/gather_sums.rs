@@ -1,20 +1,22 @@
-//! What a texel has gathered, as sums, and the estimates that follow from them. Not the gathering.
+//! What a texel has gathered, as sums over its samples, and the estimates that follow from them. Not the gathering:
+//! that is `gather`.
 
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::denoise::replicates::REPLICATES;
 
-/// The weights of a replicate's samples: their mean is 1 in the long run, so that what they are beside it can be taken out of what was
-/// gathered (regression; Owen and Zhou, "Safe and Effective Importance Sampling", 2000). Under light that is the same all around nothing
-/// else differs.
+/// Sums of the weights of a replicate's samples. The expected weight is 1, so the effect of a mean weight that differs
+/// from 1 can be removed from the estimate: the weight is a control variate, with its coefficient by regression (Owen
+/// and Zhou, "Safe and Effective Importance Sampling", 2000). Under light that is the same from all directions, the
+/// weights are all the noise.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Weights {
     pub sum: f32,
     pub squares: f32,
-    /// Of each weight with the light that it brought.
+    /// Sum of each weight times the light of its sample.
     pub products: Vec3,
-    /// And of that light, mean of the channels, with itself.
+    /// Sum of the squared light of the samples, mean of the channels.
     pub light_squares: f32,
 }
 
@@ -27,24 +29,24 @@ impl Weights {
     }
 }
 
-/// What a texel has gathered: irradiance by bounces.
+/// What a texel has gathered: sums for its irradiance by bounces.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct GatherSums {
     /// Sum of the samples of each replicate.
     pub sums: [Vec3; REPLICATES],
-    /// What tells how far their weights alone made them so.
+    /// Sums of the weights of those samples.
     pub weights: [Weights; REPLICATES],
-    /// Sum over all samples of what the patches' errors add.
+    /// Sum over all samples of the patches' errors that they read, each with its sign.
     pub patch_errors: Vec2,
-    /// Sum over all samples of the variance that they add since the texels that they read are themselves uncertain.
+    /// Sum over all samples of the variance that comes from the uncertain light of the texels that they read.
     pub texel_variances: f32,
-    /// Samples that read such a texel, and no patch.
+    /// Samples that read a texel instead of a patch.
     pub texel_reads: u32,
-    /// Samples that asked a real bounce beside the patch, the sum of the differences and of their squares.
+    /// Samples whose patch was checked against a real bounce; the sum of the differences and that of their squares.
     pub checks: u32,
     pub differences: Vec3,
     pub squared_differences: f32,
-    /// Sum over all samples of 1 / distance to what was met, canonical units.
+    /// Weighted sum over all samples of 1 / distance to the surface that was hit, canonical units.
     pub inverse_distances: f32,
     /// Samples of each replicate.
     pub samples: u32,
@@ -52,12 +54,13 @@ pub(crate) struct GatherSums {
     pub rays: u64,
 }
 
-/// Variance of weights below which they are all the same.
-const MIN_SPREAD: f32 = 1e-4;
-/// Samples below which nothing can be said about how light depends on their weights: a line through three explains most of what differs by chance.
-const ENOUGH: f32 = 9.0;
-/// Share of the light's variance that goes with the weights where they are taken out.
-const EXPLAINED: f32 = 0.6;
+/// Variance of the weights below which they count as equal.
+const MIN_WEIGHT_VARIANCE: f32 = 1e-4;
+/// Fewer samples than this say nothing about how light depends on the weights: a line through three points explains
+/// most of their scatter by chance.
+const MIN_REGRESSION_SAMPLES: f32 = 9.0;
+/// The weights' effect is removed only where it explains more than this share of the light's variance.
+const MIN_EXPLAINED: f32 = 0.6;
 
 impl GatherSums {
     /// The estimate of each replicate.
@@ -66,57 +69,64 @@ impl GatherSums {
             return [Vec3::ZERO; REPLICATES];
         }
         let count = self.samples as f32;
-        std::array::from_fn(|own| {
-            // How light goes with weight is taken from the other replicates: so the mean stays what it is.
+        std::array::from_fn(|replicate| {
+            // The slope of light over weight comes from the other replicates, so that it leaves the expected value as
+            // it is.
             let (mut light, mut weights) = (Vec3::ZERO, Weights::default());
-            for other in (0..REPLICATES).filter(|&other| other != own) {
+            for other in (0..REPLICATES).filter(|&other| other != replicate) {
                 light += self.sums[other];
                 weights.sum += self.weights[other].sum;
                 weights.squares += self.weights[other].squares;
                 weights.products += self.weights[other].products;
                 weights.light_squares += self.weights[other].light_squares;
             }
-            let all = count * (REPLICATES - 1) as f32;
-            let spread = weights.squares - weights.sum * weights.sum / all;
-            let together = weights.products - light * (weights.sum / all);
-            let grey = |light: Vec3| light.element_sum() / 3.0;
-            let light_spread = weights.light_squares - grey(light).powi(2) / all;
-            // From few samples the slope is noise itself: it has to explain most of what differs.
-            let explained = grey(together).powi(2) > EXPLAINED * spread * light_spread;
-            let slope = together / spread;
-            let known = all >= ENOUGH && spread > MIN_SPREAD * all && explained && slope.is_finite();
-            let slope = if known { slope } else { Vec3::ZERO };
-            self.sums[own] / count - slope * (self.weights[own].sum / count - 1.0)
+            let others = count * (REPLICATES - 1) as f32;
+            let channel_mean = |light: Vec3| light.element_sum() / 3.0;
+            // Sums of squares and products about the means.
+            let weight_scatter = weights.squares - weights.sum * weights.sum / others;
+            let cross_scatter = weights.products - light * (weights.sum / others);
+            let light_scatter = weights.light_squares - channel_mean(light).powi(2) / others;
+            // With few samples the slope itself is noise: it has to explain most of the scatter.
+            let is_explained =
+                channel_mean(cross_scatter).powi(2) > MIN_EXPLAINED * weight_scatter * light_scatter;
+            let slope = cross_scatter / weight_scatter;
+            let is_known = others >= MIN_REGRESSION_SAMPLES
+                && weight_scatter > MIN_WEIGHT_VARIANCE * others
+                && is_explained
+                && slope.is_finite();
+            let slope = if is_known { slope } else { Vec3::ZERO };
+            self.sums[replicate] / count - slope * (self.weights[replicate].sum / count - 1.0)
         })
     }
 
-    /// Mean of 1 / distance to what light comes from: the irradiance changes over lengths of its inverse (Ward, Rubinstein and Clear,
-    /// "A Ray Tracing Solution for Diffuse Interreflection", 1988).
+    /// Mean of 1 / distance to the surfaces that light comes from. Its inverse is the length over which the irradiance
+    /// changes (Ward, Rubinstein and Clear, "A Ray Tracing Solution for Diffuse Interreflection", 1988).
     pub fn inverse_distance(&self) -> f32 {
         self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
     }
 
-    /// The share of the samples that read a texel that was gathered before, in [0, 1].
+    /// The share of the samples that read a texel gathered in an earlier round, in [0, 1].
     pub fn texel_share(&self) -> f64 {
         (f64::from(self.texel_reads) / self.count()).min(1.0)
     }
 
-    /// What the patches' errors add to the mean of the replicates, each with its sign.
+    /// The patches' errors in the mean of the replicates, each with its sign.
     pub fn patch_error(&self) -> Vec2 {
         self.patch_errors / self.count() as f32
     }
 
-    /// Samples of all replicates; at least one.
+    /// Samples of all replicates together, and never 0, to be divided by.
     pub fn count(&self) -> f64 {
         f64::from(self.samples.max(1)) * REPLICATES as f64
     }
 
-    /// The squared error that what was read adds to the mean of the replicates: the patches', and that of texels that were gathered before.
+    /// The squared error in the mean of the replicates that comes from what was read: patches, and texels gathered in
+    /// an earlier round.
     pub fn squared_read_error(&self) -> f32 {
         self.patch_error().length_squared() + self.texel_variance()
     }
 
-    /// The variance that the texels that were read add to the mean of the replicates.
+    /// The variance in the mean of the replicates that comes from the texels that were read.
     pub fn texel_variance(&self) -> f32 {
         self.texel_variances / self.count() as f32
     }

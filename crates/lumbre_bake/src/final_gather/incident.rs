@@ -1,5 +1,6 @@
-//! Where a receiver's light by bounces comes from: points by cosine rays and by the guide, several receivers at a time, so that what they
-//! read is on its way from memory together. Not what is made of it: that is `gather`.
+//! Samples of where a receiver's light by bounces comes from: surfaces found by cosine rays and by the guide, for
+//! several receivers at a time, so that what they read is on its way from memory together. Not how samples add up: that
+//! is `gather`.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -14,19 +15,19 @@ use crate::scene::material::Side;
 use crate::scene::{Receiver, SurfaceHit};
 use crate::texel_index::MapTexel;
 
-/// A receiver that asks for a sample of its light by bounces.
+/// A request for one sample of a receiver's light by bounces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GatherRequest {
     pub receiver: Receiver,
-    /// Its region of the guide; without one cosine rays only.
+    /// The receiver's region of the guide; without one, only cosine rays are cast.
     pub region: Option<Region>,
-    /// In the unit square.
+    /// The sample's point in the unit square.
     pub u: f32,
     pub v: f32,
 }
 
 impl GatherRequest {
-    /// Fills the lists' empty places.
+    /// A placeholder for empty places of a batch.
     pub const NOWHERE: Self = Self {
         receiver: Receiver {
             position: Vec3::ZERO,
@@ -40,7 +41,7 @@ impl GatherRequest {
     };
 }
 
-/// A surface that a sample has met.
+/// A surface that a sample has hit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hit {
     pub triangle: u32,
@@ -48,20 +49,21 @@ pub(crate) struct Hit {
     pub at: (f32, f32),
     pub patch: PatchIndex,
     pub reflectance: Vec3,
-    /// Irradiance there: direct, and the texel's or patch's by bounces.
+    /// Irradiance there: direct, and by bounces as the texel or the patch has it.
     pub direct: Vec3,
     pub indirect: Vec3,
-    /// The patches' errors in that.
+    /// The patches' errors in `indirect`, each with its sign.
     pub error: Vec2,
-    /// The squared error of `indirect` where it is that of a texel that was gathered before, and not the patch's.
+    /// The squared error of `indirect` where it is that of a texel gathered in an earlier round; `None` where it is the
+    /// patch's.
     pub variance: Option<f32>,
-    /// Of the ray, of unit length, and how far it went.
+    /// Unit direction of the ray, and the distance it went.
     pub direction: Vec3,
     pub distance: f32,
 }
 
 impl Hit {
-    /// Nothing is read yet.
+    /// A hit whose light has not been read yet.
     const UNREAD: Self = Self {
         triangle: 0,
         side: Side::Front,
@@ -77,52 +79,56 @@ impl Hit {
     };
 }
 
-/// What a sample has found.
+/// The result of a sample.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct IncidentSample {
-    /// A surface that reflects.
+    /// The reflecting surface that was hit, if one was.
     pub hit: Option<Hit>,
-    /// Or else what arrives all the same, times π as all light is here: the sky's, or none. Weighted.
+    /// Without a hit, the light of the sky, if it was reached: its irradiance (π times its radiance, W/m²), already
+    /// weighted.
     pub light: Vec3,
     pub weight: f32,
 }
 
 impl IncidentSample {
-    /// No light and no weight: what the guide named is not to be seen.
+    /// No light and no weight: the point that the guide proposed is not visible.
     pub const NOTHING: Self = Self { hit: None, light: Vec3::ZERO, weight: 0.0 };
 }
 
-/// Where a sample looks.
+/// Where a sample's ray goes.
 #[derive(Clone, Copy)]
 pub(crate) enum SampleTarget {
-    /// In a direction about the receiver's normal.
-    Around(Vec3),
-    /// At a point of a region that the guide named with this probability, as it would be met; and the point just off it.
-    At(Region, f32, Hit, Vec3),
+    /// In a direction, cosine-distributed about the receiver's normal.
+    Direction(Vec3),
+    /// To a point of a region that the guide chose with this probability: the hit if nothing is in between, and the
+    /// point just off its surface.
+    Point(Region, f32, Hit, Vec3),
+    /// The guide's point cannot light the receiver.
     Nowhere,
 }
 
-/// A sample under way.
+/// The state of a sample while it is followed.
 #[derive(Clone, Copy)]
 pub(crate) struct SamplePath {
-    aim: SampleTarget,
-    /// Of the samples, what the guide places; none if it knows nothing of the receiver.
-    share: Option<f32>,
-    /// Part of the guide's row that is asked next.
-    part: RowPart,
-    /// Region and texel met, where they count, and the texel's direct light.
+    target: SampleTarget,
+    /// The share of the samples that the guide places; `None` if it knows nothing of the receiver.
+    guided_share: Option<f32>,
+    /// Part of the guide's row that is searched next.
+    row_part: RowPart,
+    /// The region that was hit, if the guide knows the receiver.
     region: Option<Region>,
+    /// The texel that was hit, its direct light and its mean reflectance; both NaN where it has none.
     texel: MapTexel,
     direct: Vec3,
     reflectance: Vec3,
 }
 
 impl SamplePath {
-    /// Nothing is known.
+    /// Not followed yet.
     pub const NONE: Self = Self {
-        aim: SampleTarget::Nowhere,
-        share: None,
-        part: RowPart::NONE,
+        target: SampleTarget::Nowhere,
+        guided_share: None,
+        row_part: RowPart::NONE,
         region: None,
         texel: MapTexel::NONE,
         direct: Vec3::ZERO,
@@ -130,60 +136,62 @@ impl SamplePath {
     };
 }
 
-/// What the direction of a ray about a receiver's normal is worth: cos θ / π, with what lies under the facet mirrored up.
-fn kernel(receiver: &Receiver, direction: Vec3) -> f32 {
+/// The density of [`sample_cosine`]: cos θ / π about the shading normal, with what lies below the facet mirrored up.
+fn cosine_density(receiver: &Receiver, direction: Vec3) -> f32 {
     let below = direction - receiver.geometric_normal * (2.0 * direction.dot(receiver.geometric_normal));
     (direction.dot(receiver.normal).max(0.0) + below.dot(receiver.normal).max(0.0)) * FRAC_1_PI
 }
 
-/// A direction with density [`kernel`].
+/// A cosine-distributed direction about a receiver's shading normal, above its facet.
 #[inline]
-fn about(receiver: &Receiver, u: f32, v: f32) -> Vec3 {
+fn sample_cosine(receiver: &Receiver, u: f32, v: f32) -> Vec3 {
     let direction = cosine_about(receiver.normal, u, v);
     let below = direction.dot(receiver.geometric_normal);
     if below <= 0.0 {
-        // Under the facet though above the smooth surface: mirrored up.
+        // Below the facet, though above the smooth surface: mirrored up.
         return direction - receiver.geometric_normal * (2.0 * below);
     }
     direction
 }
 
 impl RadianceCache<'_> {
-    /// For each receiver a point that its light by bounces comes from: some of the samples, if the guide knows the receiver's region, are
-    /// points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic (Veach and Guibas, "Optimally
-    /// Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
+    /// For each receiver, samples one point that its light by bounces comes from. If the guide knows the receiver's
+    /// region, a share of the samples are points of regions that it chooses; the others are what cosine rays hit. They
+    /// are combined by the balance heuristic (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte
+    /// Carlo Rendering", 1995, section 3.3).
     pub(crate) fn incident(
         &self,
         requests: &[GatherRequest],
         paths: &mut [SamplePath],
-        found: &mut [IncidentSample],
+        results: &mut [IncidentSample],
     ) {
-        // One thing for all samples before the next: the loops that read from afar do little else.
-        let (paths, found) = (&mut paths[..requests.len()], &mut found[..requests.len()]);
+        // Each step is done for all samples before the next: loops that read distant memory do little else, so reads
+        // overlap.
+        let (paths, results) = (&mut paths[..requests.len()], &mut results[..requests.len()]);
         for (path, request) in paths.iter_mut().zip(requests) {
-            path.share = request.region.and_then(|region| self.guide.share(region));
-            if let (Some(region), Some(share)) = (request.region, path.share)
+            path.guided_share = request.region.and_then(|region| self.guide.share(region));
+            if let (Some(region), Some(share)) = (request.region, path.guided_share)
                 && request.u < share
             {
-                path.part = self.guide.near(region, request.u / share);
+                path.row_part = self.guide.near(region, request.u / share);
             }
         }
         for (path, request) in paths.iter_mut().zip(requests) {
-            self.aim(request, path);
+            self.choose_target(request, path);
         }
-        for ((path, request), found) in paths.iter().zip(requests).zip(found.iter_mut()) {
-            self.follow(request, path, found);
+        for ((path, request), result) in paths.iter().zip(requests).zip(results.iter_mut()) {
+            self.follow(request, path, result);
         }
-        for (path, found) in paths.iter_mut().zip(found.iter_mut()) {
+        for (path, result) in paths.iter_mut().zip(results.iter_mut()) {
             path.texel = MapTexel::NONE;
-            let Some(hit) = &mut found.hit else { continue };
+            let Some(hit) = &mut result.hit else { continue };
             let Some(patch) = self.patches.at(hit.triangle, hit.side, hit.at) else {
-                *found = IncidentSample::NOTHING;
+                *result = IncidentSample::NOTHING;
                 continue;
             };
-            path.region = match path.aim {
-                SampleTarget::At(region, ..) => Some(region),
-                _ if path.share.is_some() => self.guide.region_at(hit.triangle, hit.side, hit.at),
+            path.region = match path.target {
+                SampleTarget::Point(region, ..) => Some(region),
+                _ if path.guided_share.is_some() => self.guide.region_at(hit.triangle, hit.side, hit.at),
                 _ => None,
             };
             hit.patch = patch;
@@ -193,8 +201,8 @@ impl RadianceCache<'_> {
             path.direct = self.direct.get(path.texel.place()).copied().unwrap_or(Vec3::NAN);
             path.reflectance = self.reflectance.get(path.texel.place()).copied().unwrap_or(Vec3::NAN);
         }
-        for ((path, request), found) in paths.iter_mut().zip(requests).zip(found.iter_mut()) {
-            let Some(hit) = &mut found.hit else { continue };
+        for ((path, request), result) in paths.iter_mut().zip(requests).zip(results.iter_mut()) {
+            let Some(hit) = &mut result.hit else { continue };
             hit.reflectance = match path.reflectance.x.is_nan() {
                 true => self.reflectance_at(hit.triangle, hit.side, hit.at),
                 false => path.reflectance,
@@ -209,91 +217,95 @@ impl RadianceCache<'_> {
                     hit.error = self.patch_error[hit.patch.place()];
                 }
             }
-            if let (SampleTarget::Around(_), Some(own), Some(region)) =
-                (&path.aim, request.region, path.region)
+            if let (SampleTarget::Direction(_), Some(receiver_region), Some(region)) =
+                (&path.target, request.region, path.region)
             {
-                path.part = self.guide.near_region(own, region);
+                path.row_part = self.guide.near_region(receiver_region, region);
             }
         }
-        for ((path, request), found) in paths.iter().zip(requests).zip(found) {
-            let Some(hit) = &mut found.hit else { continue };
+        for ((path, request), result) in paths.iter().zip(requests).zip(results) {
+            let Some(hit) = &mut result.hit else { continue };
             hit.direct =
                 if path.direct.x.is_nan() { self.patch_direct[hit.patch.place()] } else { path.direct };
-            if let Some(share) = path.share {
+            if let Some(share) = path.guided_share {
                 match self.weight(request, path, share, hit) {
-                    Some(weight) => found.weight = weight,
-                    None => *found = IncidentSample::NOTHING,
+                    Some(weight) => result.weight = weight,
+                    None => *result = IncidentSample::NOTHING,
                 }
             }
         }
     }
 
-    /// Where to look.
+    /// Decides where the sample's ray goes.
     #[inline]
-    fn aim(&self, request: &GatherRequest, path: &mut SamplePath) {
+    fn choose_target(&self, request: &GatherRequest, path: &mut SamplePath) {
         let &GatherRequest { ref receiver, u, v, .. } = request;
-        path.aim = match path.share {
-            None => SampleTarget::Around(about(receiver, u, v)),
+        path.target = match path.guided_share {
+            None => SampleTarget::Direction(sample_cosine(receiver, u, v)),
             Some(share) if u >= share => {
-                SampleTarget::Around(about(receiver, (u - share) / (1.0 - share), v))
+                SampleTarget::Direction(sample_cosine(receiver, (u - share) / (1.0 - share), v))
             }
             Some(share) => {
-                let picked = self.guide.pick(&path.part, u / share);
-                let point = picked
-                    .and_then(|(region, u, probability)| self.point_of(receiver, region, probability, u, v));
+                let picked = self.guide.pick(&path.row_part, u / share);
+                let point = picked.and_then(|(region, u, probability)| {
+                    self.region_point(receiver, region, probability, u, v)
+                });
                 point.unwrap_or(SampleTarget::Nowhere)
             }
         };
     }
 
-    /// What is there, its light not read yet.
+    /// Casts the sample's ray; the light of what it hits is not read yet.
     #[inline]
-    fn follow(&self, request: &GatherRequest, path: &SamplePath, found: &mut IncidentSample) {
-        *found = IncidentSample::NOTHING;
+    fn follow(&self, request: &GatherRequest, path: &SamplePath, result: &mut IncidentSample) {
+        *result = IncidentSample::NOTHING;
         let origin = request.receiver.origin;
-        match &path.aim {
+        match &path.target {
             SampleTarget::Nowhere => {}
-            SampleTarget::At(_, _, hit, end) => {
+            SampleTarget::Point(_, _, hit, end) => {
                 if !self.scene.blocked(origin, *end) {
-                    found.hit = Some(*hit);
-                    found.weight = 1.0;
+                    result.hit = Some(*hit);
+                    result.weight = 1.0;
                 }
             }
-            &SampleTarget::Around(direction) => {
-                // The sky is found by these alone.
-                let rest = 1.0 - path.share.unwrap_or(0.0);
+            &SampleTarget::Direction(direction) => {
+                // Only these samples find the sky and the black insides, which the guide does not know.
+                let cosine_share = 1.0 - path.guided_share.unwrap_or(0.0);
                 match self.scene.first_hit(origin, direction) {
                     SurfaceHit::Lit { triangle, side, at, distance } => {
-                        found.hit = Some(Hit { triangle, side, at, direction, distance, ..Hit::UNREAD });
-                        found.weight = 1.0;
+                        result.hit = Some(Hit { triangle, side, at, direction, distance, ..Hit::UNREAD });
+                        result.weight = 1.0;
                     }
-                    SurfaceHit::None => (found.light, found.weight) = (self.sky / rest, 1.0 / rest),
-                    SurfaceHit::Back | SurfaceHit::Inside => found.weight = 1.0 / rest,
+                    SurfaceHit::None => {
+                        (result.light, result.weight) = (self.sky / cosine_share, 1.0 / cosine_share);
+                    }
+                    SurfaceHit::Back | SurfaceHit::Inside => result.weight = 1.0 / cosine_share,
                 }
             }
         }
     }
 
-    /// The weight of a sample of which the guide places a share.
+    /// The weight of a sample where the guide places this share of the samples; `None` for a sample that cannot count.
     #[inline]
     fn weight(&self, request: &GatherRequest, path: &SamplePath, share: f32, hit: &Hit) -> Option<f32> {
         let region = path.region?;
-        let probability = match path.aim {
-            SampleTarget::At(_, probability, ..) => probability,
-            _ => self.guide.probability(&path.part, region),
+        let probability = match path.target {
+            SampleTarget::Point(_, probability, ..) => probability,
+            _ => self.guide.probability(&path.row_part, region),
         };
-        // Densities over the surfaces' area.
+        // Densities per area of the surface that was hit.
         let by_guide = probability / self.guide.region(region).area;
         let normal = self.scene.triangles[hit.triangle as usize].side_normal(hit.side);
         let cosine = -hit.direction.dot(normal);
-        let by_cosine = kernel(&request.receiver, hit.direction) * cosine / (hit.distance * hit.distance);
+        let by_cosine =
+            cosine_density(&request.receiver, hit.direction) * cosine / (hit.distance * hit.distance);
         let weight = by_cosine / ((1.0 - share) * by_cosine + share * by_guide);
         (cosine > 0.0 && weight.is_finite()).then_some(weight)
     }
 
-    /// A point of a region, if it and the receiver face each other.
+    /// A point of a region as a target, if it and the receiver face each other.
     #[inline]
-    fn point_of(
+    fn region_point(
         &self,
         receiver: &Receiver,
         region: Region,
@@ -305,25 +317,21 @@ impl RadianceCache<'_> {
         let at = self.guide.point(region, triangle_point(u, v));
         let surface = &self.scene.triangles[triangle as usize];
         let position = surface.position(at.0, at.1);
-        let apart = position - receiver.position;
-        let distance = apart.length();
-        let direction = apart / distance;
-        let faces =
+        let offset = position - receiver.position;
+        let distance = offset.length();
+        let direction = offset / distance;
+        let is_facing =
             direction.dot(surface.side_normal(side)) < 0.0 && direction.dot(receiver.geometric_normal) > 0.0;
-        if !faces {
+        if !is_facing {
             return None;
         }
         let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
         let hit = Hit { triangle, side, at, direction, distance, ..Hit::UNREAD };
-        Some(SampleTarget::At(region, probability, hit, end))
+        Some(SampleTarget::Point(region, probability, hit, end))
     }
 
-    /// The receiver at a surface that was met.
+    /// The receiver at the surface that was hit.
     pub(crate) fn receiver_at(&self, hit: &Hit) -> Receiver {
-        let surface = &self.scene.triangles[hit.triangle as usize];
-        let position = surface.position(hit.at.0, hit.at.1);
-        let origin = self.scene.off_surface(hit.triangle, hit.side, position);
-        let normal = surface.side_normal(hit.side);
-        Receiver { position, origin, geometric_normal: normal, normal }
+        Receiver::on_facet(self.scene, hit.triangle, hit.side, hit.at)
     }
 }

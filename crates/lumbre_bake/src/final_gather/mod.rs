@@ -1,5 +1,5 @@
-//! The light by bounces of every covered texel: rays that read the radiance of patches and texels, in rounds until the error asked for is reached.
-//! Not the smoothing of what they found.
+//! The final gather: the light by bounces of every covered texel, by rays that read the radiance of patches and texels,
+//! in rounds until the requested error is reached. Not the smoothing of the result: that is `denoise`.
 
 pub(crate) mod error_estimate;
 pub(crate) mod error_ledger;

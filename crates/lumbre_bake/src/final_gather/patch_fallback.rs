@@ -1,4 +1,5 @@
-//! Texels for which there was no time, or too little: they show the patches' own solution, and say how little that is worth. Not the gather.
+//! Texels that had no time to gather, or too little: they show the patches' own solution, with an error that says how
+//! rough that is. Not the gather.
 
 use glam::{Vec2, Vec3};
 
@@ -9,42 +10,47 @@ use crate::final_gather::radiance_cache::RadianceCache;
 use crate::scene::material::Side;
 
 /// Fewer gathered texels than this say nothing about the others.
-const ENOUGH: u32 = 256;
+const MIN_GATHERED: u32 = 256;
 
-/// Samples of a replicate up to which darkness all around says less than the patch does.
-const FEW: u32 = 3;
+/// Where no more samples per replicate than this found only darkness, the patch says more than they do.
+const FEW_SAMPLES: u32 = 3;
 
-/// Gives every texel that has gathered nothing, or nothing but darkness from few rays, the irradiance of its patch. Its error is by as much as
-/// patches are off where texels did gather, relative to the light, and all of it where too few did.
+/// Gives the irradiance of its patch to every texel that has gathered nothing, or nothing but darkness from few rays.
+/// The error stated for it is, relative to the light, the RMS difference between patches and texels where texels did
+/// gather; where too few did, it is all of the light.
 pub(crate) fn from_patches(cache: &RadianceCache<'_>, texels: &[Texel], gathered: &mut [GatherSums]) {
-    let of_patch = |texel: &Texel| -> Vec3 {
+    let patch_light = |texel: &Texel| -> Vec3 {
         let Some(point) = texel.point(cache.scene, 0.5, 0.5) else { return Vec3::ZERO };
         let patch = cache.patches.at(point.triangle, Side::Front, point.at);
         patch.map_or(Vec3::ZERO, |patch| cache.patch_indirect[patch.place()])
     };
-    let grey = |light: Vec3| f64::from(light.element_sum()) / 3.0;
-    let (mut apart, mut all, mut count) = (0.0, 0.0, 0u32);
-    for (texel, own) in texels.iter().zip(&*gathered).filter(|(_, own)| own.samples > 0) {
-        let estimates = own.estimates();
-        let mean = grey(mean(&estimates));
-        // What chance moved the mean by is no fault of the patch.
-        let by_chance = f64::from(variance(&estimates).element_sum()) / 3.0;
-        apart += (mean - grey(of_patch(texel))).powi(2) - by_chance;
-        all += mean.powi(2) - by_chance;
+    let channel_mean = |light: Vec3| f64::from(light.element_sum()) / 3.0;
+    let (mut squared_differences, mut squared_light, mut count) = (0.0, 0.0, 0u32);
+    for (texel, sums) in texels.iter().zip(&*gathered).filter(|(_, sums)| sums.samples > 0) {
+        let estimates = sums.estimates();
+        let mean = channel_mean(mean(&estimates));
+        // The part of the difference that is the texel's own noise is not the patch's error.
+        let noise = f64::from(variance(&estimates).element_sum()) / 3.0;
+        squared_differences += (mean - channel_mean(patch_light(texel))).powi(2) - noise;
+        squared_light += mean.powi(2) - noise;
         count += 1;
     }
-    let off = if count >= ENOUGH && all > 0.0 { (apart.max(0.0) / all).sqrt().min(1.0) } else { 1.0 };
+    let relative_error = if count >= MIN_GATHERED && squared_light > 0.0 {
+        (squared_differences.max(0.0) / squared_light).sqrt().min(1.0)
+    } else {
+        1.0
+    };
     let knows_nothing =
-        |own: &GatherSums| own.samples <= FEW && own.sums.iter().all(|sum| *sum == Vec3::ZERO);
-    for (texel, own) in
-        texels.iter().zip(gathered).filter(|(texel, own)| knows_nothing(own) && !texel.is_hidden())
+        |sums: &GatherSums| sums.samples <= FEW_SAMPLES && sums.sums.iter().all(|sum| *sum == Vec3::ZERO);
+    for (texel, sums) in
+        texels.iter().zip(gathered).filter(|(texel, sums)| knows_nothing(sums) && !texel.is_hidden())
     {
-        let light = of_patch(texel);
-        *own = GatherSums {
+        let light = patch_light(texel);
+        *sums = GatherSums {
             sums: [light; REPLICATES],
             samples: 1,
-            rays: own.rays,
-            patch_errors: Vec2::X * REPLICATES as f32 * (off * grey(light)) as f32,
+            rays: sums.rays,
+            patch_errors: Vec2::X * REPLICATES as f32 * (relative_error * channel_mean(light)) as f32,
             ..GatherSums::default()
         };
     }

@@ -1,4 +1,5 @@
-//! The light that leaves surfaces, as the gather reads it: direct light by texel, bounces by patch or, once a round has gathered them, by texel. Not where it is asked for: that is `gather`.
+//! The light that leaves surfaces, for the gather's rays to read: direct light by texel, light by bounces by patch or,
+//! once a round has gathered it, by texel. Not the rays: they are `gather`'s and `incident`'s.
 
 use glam::{Vec2, Vec3};
 
@@ -16,41 +17,44 @@ use crate::sources::light_sources::Sources;
 use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions};
 
-/// The light that leaves surfaces, as the gather reads it.
+/// The light that leaves surfaces, for rays to read.
 pub(crate) struct RadianceCache<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
     pub patches: &'a Patches,
-    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none, and where a wall divides the texel.
+    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where a texel shows nothing, and where a
+    /// wall divides it.
     pub direct: Vec<Vec3>,
-    /// Irradiance that a surface gets of an unhidden sky.
+    /// Irradiance of a surface under an unoccluded sky, W/m².
     pub sky: Vec3,
-    /// Per patch, direct irradiance: where a texel has none.
+    /// Per patch, direct irradiance, for points whose texel has none.
     pub patch_direct: &'a [Vec3],
     /// Per patch, irradiance by bounces and by the sky.
     pub patch_indirect: &'a [Vec3],
-    /// Per patch, the errors of that, with their signs: by the form factors' noise, and by the patches' size.
+    /// Per patch, the errors of `patch_indirect`, each with its sign: by the form factors' noise, and by the patches'
+    /// size.
     pub patch_error: &'a [Vec2],
-    /// Per patch, what is nearer to it than this gets a real bounce more, canonical units.
-    pub near: &'a [f32],
-    /// What the rounds so far have found of the bounces; nothing in the first.
+    /// Per patch, the distance below which it is too coarse to be read, canonical units: nearer rays make another
+    /// bounce.
+    pub min_read_distance: &'a [f32],
+    /// The light by bounces that the rounds so far have found; empty in the first.
     pub gathered: GatheredLight,
-    /// Within this distance on a surface the errors of `gather_sums` are correlated, canonical units.
-    pub correlated: f32,
-    /// Per texel of all maps, mean reflectance, where it is not the same all over the triangle; NaN elsewhere, or empty.
+    /// Radius on a surface within which the errors of `gathered` are correlated, canonical units.
+    pub correlation_radius: f32,
+    /// Per texel of all maps, mean reflectance where it varies over the triangle, and NaN elsewhere; or empty.
     pub reflectance: Vec<Vec3>,
-    /// Where each patch's light comes from.
+    /// Which regions the light of each region comes from.
     pub guide: &'a SamplingGuide,
     /// Samples of each replicate in the first round.
-    pub run: u32,
+    pub first_round_samples: u32,
 }
 
-/// Radius, in texels, of the disc over which the errors that smoothing leaves are correlated: 4.1 after the first round of the demo level, 5.4 after the
-/// second.
+/// Radius, in texels, of the disc over which the errors that smoothing leaves are correlated: 4.1 after the first round
+/// of the demo level, 5.4 after the second.
 const CORRELATED_TEXELS: f32 = 4.5;
 
 impl<'a> RadianceCache<'a> {
-    /// As it is before the first round: direct light of texels, bounces of patches.
+    /// The cache before the first round: direct light of texels, light by bounces of patches.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
@@ -64,7 +68,7 @@ impl<'a> RadianceCache<'a> {
     ) -> Result<Self, BakeError> {
         let (scene, effort) = (sources.scene, options.effort());
         let mut direct = direct.by_place(texels);
-        // One value of both sides would be read on the wrong one.
+        // Its one value, a mean of both sides of the wall, would be wrong on either.
         for texel in &texels.divided {
             direct[texels.list[texel.place()].index.place()] = Vec3::NAN;
         }
@@ -73,7 +77,7 @@ impl<'a> RadianceCache<'a> {
         })?;
         Ok(Self {
             gathered: GatheredLight::default(),
-            correlated: CORRELATED_TEXELS * texels.side,
+            correlation_radius: CORRELATED_TEXELS * texels.side,
             reflectance,
             scene,
             layout: texels.layout,
@@ -83,15 +87,16 @@ impl<'a> RadianceCache<'a> {
             patch_direct: &exchange.direct,
             patch_indirect: &exchange.indirect,
             patch_error: &exchange.indirect_error,
-            near: &exchange.near,
+            min_read_distance: &exchange.near,
             guide: &exchange.guide,
-            run: effort.gather[0] / REPLICATES as u32,
+            first_round_samples: effort.gather[0] / REPLICATES as u32,
         })
     }
 }
 
 impl RadianceCache<'_> {
-    /// What a point of a surface reflects in all (its exitance without emission, W/m²), as far as it is known.
+    /// The exitance of a point of a surface without its emission (all that it reflects, W/m²); zero where there is no
+    /// patch.
     pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
         let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
         let texel = self.texel_at(triangle, side, at);
@@ -103,6 +108,7 @@ impl RadianceCache<'_> {
         self.reflectance_at(triangle, side, at) * irradiance
     }
 
+    /// The reflectance at a point of a surface.
     pub(crate) fn reflectance_at(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Vec3 {
         self.patches.reflectance(triangle, side).unwrap_or_else(|| {
             let triangle = &self.scene.triangles[triangle as usize];
@@ -111,13 +117,13 @@ impl RadianceCache<'_> {
         })
     }
 
-    /// The texel that shows a point; [`MapTexel::NONE`] where none does.
+    /// The texel that shows a point of a surface; [`MapTexel::NONE`] on backs and outside the map.
     pub(crate) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> MapTexel {
         let texel = self.layout.texel_at(&self.scene.triangles[triangle as usize], at);
         texel.filter(|_| side == Side::Front).unwrap_or(MapTexel::NONE)
     }
 
-    /// Of a texel, if it has one for all of it.
+    /// The direct irradiance of a texel, if one value holds for all of it.
     pub(crate) fn direct_of(&self, texel: MapTexel) -> Option<Vec3> {
         self.direct.get(texel.place()).copied().filter(|direct| !direct.x.is_nan())
     }

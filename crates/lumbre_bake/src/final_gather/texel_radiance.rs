@@ -1,4 +1,4 @@
-//! What is known of the light and the colour of whole texels, for rays that hit them. Not where rays go: that is `incident`.
+//! The light and the reflectance of whole texels, for rays that hit them. Not where rays go: that is `incident`.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -10,27 +10,28 @@ use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
 use crate::texel_index::MapTexel;
 
-/// The irradiance by bounces that a former round of the gather has found in every texel: closer than that of the patches, so that rays that read it
-/// need no further bounce.
+/// The irradiance by bounces that an earlier round of the gather has found in every texel. It is more accurate than
+/// that of the patches, so rays that read it need no further bounce.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct GatheredLight {
     /// Per texel of all maps; NaN irradiance where it is not known.
     texels: Vec<TexelLight>,
 }
 
-/// Of a texel.
+/// The light by bounces of one texel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TexelLight {
     /// By bounces, W/m².
     pub irradiance: Vec3,
-    /// The variance that noise and smoothing leave in that, mean of the channels.
+    /// The variance that noise and smoothing leave in `irradiance`, mean of the channels.
     pub variance: f32,
-    /// What the patches' errors add to it, each with its sign.
+    /// The patches' errors in `irradiance`, each with its sign.
     pub patch_error: Vec2,
 }
 
 impl GatheredLight {
-    /// Lists are those of the covered texels; `direct`, per texel of all maps, is NaN where a texel has more than one light.
+    /// `gathered`, `light` and `variances` are per covered texel; `direct`, per texel of all maps, is NaN where one
+    /// value does not hold for the whole texel.
     pub fn new(
         texels: &[Texel],
         gathered: &[GatherSums],
@@ -39,30 +40,32 @@ impl GatheredLight {
         direct: &[Vec3],
     ) -> Self {
         let unknown = TexelLight { irradiance: Vec3::NAN, variance: 0.0, patch_error: Vec2::ZERO };
-        let mut found = vec![unknown; direct.len()];
+        let mut known = vec![unknown; direct.len()];
         for (place, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
             let (irradiance, variance) = (light[place], variances[place]);
             let patch_error = gathered[place].patch_error();
-            let finite = irradiance.is_finite() && variance.is_finite() && patch_error.is_finite();
-            if finite && !direct[texel.index.place()].is_nan() {
-                found[texel.index.place()] = TexelLight { irradiance, variance, patch_error };
+            let is_finite = irradiance.is_finite() && variance.is_finite() && patch_error.is_finite();
+            if is_finite && !direct[texel.index.place()].is_nan() {
+                known[texel.index.place()] = TexelLight { irradiance, variance, patch_error };
             }
         }
-        Self { texels: found }
+        Self { texels: known }
     }
 
-    /// That of a texel, if it is known.
+    /// The light of a texel, if it is known.
     #[inline]
     pub fn at(&self, texel: MapTexel) -> Option<&TexelLight> {
         self.texels.get(texel.place()).filter(|texel| !texel.irradiance.x.is_nan())
     }
 }
 
-/// The points of a whole texel that its reflectance is the mean of, in the unit square: one in each of four columns and of four rows.
+/// The points of a whole texel over which its reflectance is averaged, in the unit square: one in each of four columns
+/// and of four rows.
 const POINTS: [[f32; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [0.625, 0.875]];
 
-/// Per texel of all maps, the mean reflectance of its front, where a texture makes it differ over the triangle; NaN elsewhere, and where light
-/// passes through some of it, as rays meet the rest alone. Empty where that is nowhere.
+/// Per texel of all maps, the mean reflectance of its front, where a texture makes it vary over the triangle; NaN
+/// elsewhere, and where light passes through parts of the surface, since rays hit only the rest. Empty where no texel
+/// has such a mean.
 pub(crate) fn mean_reflectances(
     scene: &BakeScene,
     layout: &LightmapLayout,
@@ -72,26 +75,26 @@ pub(crate) fn mean_reflectances(
     let at_point = |point: &FootprintPoint| {
         let triangle = &scene.triangles[point.triangle as usize];
         let surface = &scene.surfaces[triangle.surface as usize];
-        let one_for_all = patches.reflectance(point.triangle, Side::Front).is_some();
-        if scene.stop.is_cancelled() || one_for_all || surface.is_masked() {
+        let is_uniform = patches.reflectance(point.triangle, Side::Front).is_some();
+        if scene.stop.is_cancelled() || is_uniform || surface.is_masked() {
             return None;
         }
         let (u, v) = point.at;
         Some(surface.reflectance(Side::Front, triangle.vertices, [1.0 - u - v, u, v]))
     };
     let of_texel = |texel: &Texel| -> Option<(MapTexel, Vec3)> {
-        // All or none: beside a surface of one colour, that of the point tells.
-        let found: Option<Vec<Vec3>> = match &texel.footprint {
+        // All points or none: a texel that also shows a surface of one colour is read at the point that was hit.
+        let reflectances: Option<Vec<Vec3>> = match &texel.footprint {
             Footprint::Points(points) => points.iter().map(at_point).collect(),
             _ => POINTS.iter().map(|&[x, y]| at_point(&texel.point(scene, x, y)?)).collect(),
         };
-        let found = found.filter(|found| !found.is_empty())?;
-        Some((texel.index, found.iter().sum::<Vec3>() / found.len() as f32))
+        let reflectances = reflectances.filter(|reflectances| !reflectances.is_empty())?;
+        Some((texel.index, reflectances.iter().sum::<Vec3>() / reflectances.len() as f32))
     };
-    let found: Vec<(MapTexel, Vec3)> = texels.par_iter().filter_map(of_texel).collect();
-    let mut all = if found.is_empty() { Vec::new() } else { vec![Vec3::NAN; layout.texels] };
-    for (index, reflectance) in found {
-        all[index.place()] = reflectance;
+    let means: Vec<(MapTexel, Vec3)> = texels.par_iter().filter_map(of_texel).collect();
+    let mut by_place = if means.is_empty() { Vec::new() } else { vec![Vec3::NAN; layout.texels] };
+    for (texel, reflectance) in means {
+        by_place[texel.place()] = reflectance;
     }
-    all
+    by_place
 }

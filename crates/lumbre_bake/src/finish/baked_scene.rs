@@ -1,4 +1,5 @@
-//! What a bake has made, as plain data: maps, meshes with the coordinates to read them by, probes. Not how they get into a World: that is `apply`.
+//! The result of a bake as plain data: maps, meshes with the coordinates to read them by, probes. Not how they get into
+//! a World: that is `apply`.
 
 use std::collections::HashSet;
 use std::f32::consts::PI;
@@ -20,15 +21,16 @@ use crate::{BakeReport, Samples};
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct BakedScene {
-    /// One per object of the scene, in its order; none where there was nothing to bake.
+    /// One per object of the scene, in the scene's order; empty where there was nothing to bake.
     pub objects: Vec<BakedObject>,
     /// The maps that objects show.
     pub maps: Vec<BakedMap>,
-    /// The light for what moves, and its place, if it was called for.
+    /// The light for moving objects, with its place in the world, if it was requested.
     pub volume: Option<(Transform, IrradianceVolume)>,
-    /// What was done, what it cost and how good it is.
+    /// What was done, what it cost, and how accurate the result is.
     pub report: BakeReport,
-    /// For [`Bake::former`](crate::Bake::former) of the next time, if they were asked for and there was something to keep.
+    /// The samples for [`Bake::former`](crate::Bake::former) of the next bake, if they were requested and there was
+    /// something to keep.
     pub samples: Option<Samples>,
 }
 
@@ -36,11 +38,11 @@ pub struct BakedScene {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct BakedObject {
-    /// One per primitive: its mesh with `uv1`, which is the mesh as it was where that could hold the map.
+    /// One per primitive: its mesh with `uv1`. It is the original mesh where its `uv1` can hold the map.
     pub meshes: Vec<Arc<TriangleMesh>>,
-    /// One per primitive: its textures, which read other coordinates than before where the lightmap needed theirs.
+    /// One per primitive: its textures. They read other coordinates than before where the lightmap needed theirs.
     pub textures: Vec<Option<MaterialTextures>>,
-    /// Index of its map.
+    /// Index of its map in [`BakedScene::maps`].
     pub map: usize,
 }
 
@@ -50,27 +52,29 @@ pub struct BakedObject {
 pub struct BakedMap {
     /// E/π, row by row, 0 where nothing is known.
     pub image: Arc<LightmapImage>,
-    /// How far each texel may be off.
+    /// The standard error of each texel.
     pub errors: TexelErrors,
-    /// The map's light in two, with [`BakeOptions::separate_light`](crate::BakeOptions::separate_light).
+    /// The map's direct light and its light by bounces, with
+    /// [`BakeOptions::separate_light`](crate::BakeOptions::separate_light).
     pub separate: Option<SeparateLight>,
 }
 
-/// How far each texel of an entity's [`Lightmap`](lumbre_scene::Lightmap) may be off: one standard error in the map's own unit (E/π, mean of the
-/// channels), row by row; NaN where the map shows no surface. Against a converged bake of the same map at least 95 % of the texels are within two.
+/// One standard error of each texel of an entity's [`Lightmap`](lumbre_scene::Lightmap), in the map's own unit (E/π,
+/// mean of the channels), row by row; NaN where the map shows no surface. At least 95 % of the texels are within two
+/// standard errors of a converged bake of the same map.
 #[derive(Component, Clone, Debug)]
 pub struct TexelErrors(pub Arc<[f32]>);
 
-/// What was found of the texels of all maps.
+/// The finished texels of all maps.
 pub(crate) struct FilledTexels<'a> {
     /// W/m²; NaN where nothing is known.
     pub irradiance: &'a [Vec3],
-    /// Squared errors.
+    /// Squared errors; NaN where a texel shows no surface of its own.
     pub variances: &'a [f32],
     pub separate: Option<&'a Separate>,
 }
 
-/// Every object with its map, of its own or on a page.
+/// Every object with its map, which is its own or on a page.
 pub(crate) fn baked_objects(
     objects: &[SceneObject],
     layout: &LightmapLayout,
@@ -81,9 +85,10 @@ pub(crate) fn baked_objects(
     let on_pages = (0..pages.pages.len()).map(|index| {
         let page = &pages.pages[index];
         let size = (page.width, page.height);
-        let light = |of: &[Vec3]| pages.compose(index, layout, |texel| shown(of[texel]), Vec3::ZERO);
-        let errors = pages.compose(index, layout, |texel| error(texels.variances[texel]), f32::NAN);
-        texels.map(&format!("atlas-{}", index + 1), size, light, errors, &mut names)
+        let light =
+            |values: &[Vec3]| pages.compose(index, layout, |texel| map_value(values[texel]), Vec3::ZERO);
+        let errors = pages.compose(index, layout, |texel| map_error(texels.variances[texel]), f32::NAN);
+        texels.baked_map(&format!("atlas-{}", index + 1), size, light, errors, &mut names)
     });
     let mut maps: Vec<BakedMap> = on_pages.collect();
     let mut baked = Vec::with_capacity(objects.len());
@@ -91,10 +96,10 @@ pub(crate) fn baked_objects(
         let map = &layout.maps[index];
         let place = pages.places[index];
         if place.is_none() {
-            let own = map.first..map.first + (map.width * map.height) as usize;
-            let light = |of: &[Vec3]| of[own.clone()].iter().map(|&light| shown(light)).collect();
-            let errors = texels.variances[own.clone()].iter().map(|&variance| error(variance)).collect();
-            maps.push(texels.map(&object.name, (map.width, map.height), light, errors, &mut names));
+            let light =
+                |values: &[Vec3]| values[map.places()].iter().map(|&light| map_value(light)).collect();
+            let errors = texels.variances[map.places()].iter().map(|&variance| map_error(variance)).collect();
+            maps.push(texels.baked_map(&object.name, (map.width, map.height), light, errors, &mut names));
         }
         let mesh = |mesh: &Arc<TriangleMesh>| match place {
             Some(_) => pages.on_page(layout, index, mesh),
@@ -106,7 +111,7 @@ pub(crate) fn baked_objects(
                 .primitives
                 .iter()
                 .zip(&map.moved)
-                .map(|(part, &moved)| textures_of(part, moved))
+                .map(|(primitive, &moved)| textures_of(primitive, moved))
                 .collect(),
             map: place.map_or(maps.len() - 1, |place| place.page),
         });
@@ -115,7 +120,8 @@ pub(crate) fn baked_objects(
 }
 
 impl FilledTexels<'_> {
-    fn map(
+    /// A map from its errors and a function that lays out its light from values per texel of all maps.
+    fn baked_map(
         &self,
         name: &str,
         (width, height): (u32, u32),
@@ -123,7 +129,7 @@ impl FilledTexels<'_> {
         errors: Vec<f32>,
         names: &mut HashSet<String>,
     ) -> BakedMap {
-        let stem = unused(name, names);
+        let stem = unused_name(name, names);
         let image = |kind: &str, texels: Vec<Vec3>| {
             let (name, encoding) = (format!("{stem}{kind}.lightmap.exr"), LightmapEncoding::Rgb32Float);
             Arc::new(LightmapImage { name, width, height, texels, encoding })
@@ -136,18 +142,18 @@ impl FilledTexels<'_> {
     }
 }
 
-/// E/π of an irradiance, 0 where it is not known.
-fn shown(irradiance: Vec3) -> Vec3 {
+/// The map's value, E/π, of an irradiance; 0 where that is not known.
+fn map_value(irradiance: Vec3) -> Vec3 {
     if irradiance.is_finite() { irradiance / PI } else { Vec3::ZERO }
 }
 
-/// The error of E/π from the squared one of the irradiance.
-fn error(variance: f32) -> f32 {
+/// The standard error of the map's value from the squared error of the irradiance.
+fn map_error(variance: f32) -> f32 {
     variance.sqrt() / PI
 }
 
-/// The beginning of a file name that every system takes, used once.
-fn unused(object: &str, taken: &mut HashSet<String>) -> String {
+/// The beginning of a file name that is valid on every system, and not taken yet.
+fn unused_name(object: &str, taken: &mut HashSet<String>) -> String {
     let plain: String = object
         .chars()
         .take(64)

@@ -1,6 +1,7 @@
-//! Values at texel centres from values at the middles of what texels show: a texel half outside its chart or half under a
-//! box is moved to its centre along its neighbours' slope, and empty texels beside a chart continue it, so that bilinear
-//! filtering up to the very border reads what is there. Never across charts that have texels of their own to say.
+//! Fills maps: the value of a texel that lies half outside its chart or half under a box holds for the middle of what
+//! the texel shows, and is moved to the texel's centre along its neighbours' slope; empty texels beside a chart
+//! continue the chart, so that bilinear filtering is right up to its border. Charts never mix: a texel takes values
+//! from one chart only. Not the closing of seams: that is `seams`.
 
 use glam::{DMat2, DVec2, Vec2, Vec3};
 use rayon::prelude::*;
@@ -10,25 +11,27 @@ use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Footprint, Texel};
 use crate::scene::LightmapLayout;
 
-/// Square texels of spread below which a slope counts as unknown.
+/// Added to the variance of the neighbours' positions along each axis, in square texels: where that is much smaller,
+/// the slope is unknown and taken as zero (ridge regression).
 const RIDGE: f64 = 0.002;
 
-/// A gap that is asked for bicubic filtering.
+/// From this gap on, the maps are meant for bicubic filtering, which reads two texels far.
 const BICUBIC_RINGS: u32 = 4;
 
-/// What is known of a texel of a map.
+/// The known value of a texel of a map.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TexelValue {
     pub value: Vec3,
     /// Squared error, mean of the channels.
     pub variance: f32,
-    /// Where in the texel's unit square.
+    /// The point of the texel's unit square that the value holds for.
     pub middle: Vec2,
     pub chart: u32,
 }
 
-/// One map's texels from those known; `None` where nothing is within reach. `rings` is how far values are carried out of
-/// the charts; into texels that other geometry hides they go only where a point in the open reads them.
+/// Fills one map from its known texels; `None` where no known texel is within reach. Values are continued `rings`
+/// texels out of the charts; into texels that other geometry hides, only where filtering reads them from a point in the
+/// open.
 fn fill_map(
     (width, height): (u32, u32),
     known: &[Option<TexelValue>],
@@ -36,37 +39,37 @@ fn fill_map(
     rings: u32,
     stop: &CancelToken,
 ) -> Vec<Option<TexelValue>> {
-    // The charts' own texels first, moved to their centres.
+    // First the charts' own texels, moved to their centres.
     let mut current: Vec<Option<TexelValue>> = (0..known.len())
         .into_par_iter()
         .map(|index| {
-            let own = known[index].filter(|_| !stop.is_cancelled())?;
-            let offset = Vec2::splat(0.5) - own.middle;
-            // A tenth of a texel is below what a slope can be told from.
+            let texel = known[index].filter(|_| !stop.is_cancelled())?;
+            let offset = Vec2::splat(0.5) - texel.middle;
+            // Within a tenth of a texel, moving by an uncertain slope would gain nothing.
             if offset.abs().max_element() < 0.1 {
-                return Some(own);
+                return Some(texel);
             }
             let (x, y) = (index as u32 % width, index as u32 / width);
-            let (value, variance) =
-                continued(width, height, known, x, y, own.chart, true).unwrap_or((own.value, own.variance));
-            Some(TexelValue { value, variance, middle: Vec2::splat(0.5), ..own })
+            let (value, variance) = extrapolate(width, height, known, x, y, texel.chart, true)
+                .unwrap_or((texel.value, texel.variance));
+            Some(TexelValue { value, variance, middle: Vec2::splat(0.5), ..texel })
         })
         .collect();
     for ring in 0..rings.max(2) {
         let next: Vec<Option<TexelValue>> = (0..current.len())
             .into_par_iter()
             .map(|index| {
-                let wanted = match hidden[index] {
+                let is_wanted = match hidden[index] {
                     Hidden::No => ring < rings,
                     Hidden::ReadFromTheOpen => true,
                     Hidden::Deep => false,
                 };
-                if current[index].is_some() || !wanted || stop.is_cancelled() {
+                if current[index].is_some() || !is_wanted || stop.is_cancelled() {
                     return current[index];
                 }
                 let (x, y) = (index as u32 % width, index as u32 / width);
                 let chart = nearest_chart(width, height, &current, x, y)?;
-                let (value, variance) = continued(width, height, &current, x, y, chart, false)?;
+                let (value, variance) = extrapolate(width, height, &current, x, y, chart, false)?;
                 Some(TexelValue { value, variance, middle: Vec2::splat(0.5), chart })
             })
             .collect();
@@ -81,16 +84,16 @@ enum Hidden {
     /// It does not.
     #[default]
     No,
-    /// It does, but bilinear filtering reads it from a point in the open, less than a texel away.
+    /// It does, but filtering reads it from a point in the open nearby.
     ReadFromTheOpen,
-    /// It does, and nobody sees it: its light is none.
+    /// It does, and filtering never reads it.
     Deep,
 }
 
-/// The chart of the nearest of the eight neighbours.
+/// The chart of the nearest known one of the eight neighbours.
 fn nearest_chart(width: u32, height: u32, known: &[Option<TexelValue>], x: u32, y: u32) -> Option<u32> {
     let mut best: Option<(u32, u32)> = None;
-    for (nx, ny) in around(width, height, x, y, 1) {
+    for (nx, ny) in texels_within(width, height, x, y, 1) {
         if let Some(neighbour) = &known[(ny * width + nx) as usize] {
             let distance = x.abs_diff(nx) + y.abs_diff(ny);
             if best.is_none_or(|(least, _)| distance < least) {
@@ -101,29 +104,31 @@ fn nearest_chart(width: u32, height: u32, known: &[Option<TexelValue>], x: u32, 
     best.map(|(_, chart)| chart)
 }
 
-/// The value at a texel's centre by a plane through its chart's texels around, held within their range (and a little
-/// more): weighted least squares. With it comes its squared error: by errors that have nothing to do with each other or by errors that are
-/// all alike, whichever is more, as smoothed texels are in between.
-fn continued(
+/// The value at a texel's centre by a plane through the texels of a chart around it, fitted by weighted least squares
+/// and clamped to their range and a little more; and its squared error. For that the neighbours' errors are taken as
+/// independent or as all the same, whichever gives more, since smoothed texels are in between. The texel's own value
+/// takes part if `includes_itself`.
+fn extrapolate(
     width: u32,
     height: u32,
     known: &[Option<TexelValue>],
     x: u32,
     y: u32,
     chart: u32,
-    own_counts: bool,
+    includes_itself: bool,
 ) -> Option<(Vec3, f32)> {
     let center = Vec2::new(x as f32, y as f32) + 0.5;
     let mut moments = [0.0f64; 6];
     let mut sums = [glam::DVec3::ZERO; 3];
-    // Of the texels next to it, and of those one further.
+    // Ranges of the values of the nine nearest texels, and of those one texel further out.
     let mut ranges = [(Vec3::INFINITY, Vec3::NEG_INFINITY); 2];
+    // Distance, value and squared error.
     let mut nearest = (f32::INFINITY, Vec3::ZERO, 0.0);
-    // Weights, places and squared errors.
+    // Weights, offsets from the centre, and squared errors.
     let mut terms = [(0.0f64, DVec2::ZERO, 0.0f64); 25];
     let mut count = 0;
-    for (nx, ny) in around(width, height, x, y, 2) {
-        if !own_counts && nx == x && ny == y {
+    for (nx, ny) in texels_within(width, height, x, y, 2) {
+        if !includes_itself && nx == x && ny == y {
             continue;
         }
         let Some(other) = known[(ny * width + nx) as usize].filter(|other| other.chart == chart) else {
@@ -150,36 +155,45 @@ fn continued(
         return None;
     }
     let [_, sx, sy, sxx, sxy, syy] = moments.map(|moment| moment / moments[0]);
-    // About the middle of those known: a row of texels, which knows no slope across itself, makes none up.
+    // The plane is fitted about the mean position of the known texels, so that a row of texels gets no slope across
+    // itself.
     let spread = DMat2::from_cols(
         DVec2::new(sxx - sx * sx + RIDGE, sxy - sx * sy),
         DVec2::new(sxy - sx * sy, syy - sy * sy + RIDGE),
     );
-    let towards = spread.inverse() * DVec2::new(-sx, -sy);
+    let to_centre = spread.inverse() * DVec2::new(-sx, -sy);
     let [mean, with_x, with_y] = sums.map(|sum| sum / moments[0]);
-    let value = (mean + (with_x - mean * sx) * towards.x + (with_y - mean * sy) * towards.y).as_vec3();
-    // A shadow's edge two texels away does not reach a texel whose neighbours know nothing of it.
+    let value = (mean + (with_x - mean * sx) * to_centre.x + (with_y - mean * sy) * to_centre.y).as_vec3();
+    // The nearest texels alone give the range, if there are any: a shadow's edge two texels away must not reach this
+    // one.
     let (low, high) = if ranges[0].0.x <= ranges[0].1.x { ranges[0] } else { ranges[1] };
-    let reach = (high - low) * 0.5;
-    let value = value.clamp((low - reach).max(Vec3::ZERO), high + reach);
-    let (mut apart, mut alike) = (0.0, 0.0);
+    let margin = (high - low) * 0.5;
+    let value = value.clamp((low - margin).max(Vec3::ZERO), high + margin);
+    let (mut independent, mut correlated) = (0.0, 0.0);
     for (weight, d, variance) in &terms[..count] {
-        let share = weight / moments[0] * (1.0 + (*d - DVec2::new(sx, sy)).dot(towards));
-        apart += share * share * variance;
-        alike += share * variance.sqrt();
+        let share = weight / moments[0] * (1.0 + (*d - DVec2::new(sx, sy)).dot(to_centre));
+        independent += share * share * variance;
+        correlated += share * variance.sqrt();
     }
-    let variance = apart.max(alike * alike) as f32;
+    let variance = independent.max(correlated * correlated) as f32;
     Some(if value.is_finite() && variance.is_finite() { (value, variance) } else { (nearest.1, nearest.2) })
 }
 
-/// Texels within `radius` of one, itself among them.
-fn around(width: u32, height: u32, x: u32, y: u32, radius: u32) -> impl Iterator<Item = (u32, u32)> {
+/// The texels within `radius` of a texel, itself included, row by row.
+pub(super) fn texels_within(
+    width: u32,
+    height: u32,
+    x: u32,
+    y: u32,
+    radius: u32,
+) -> impl Iterator<Item = (u32, u32)> {
     let columns = x.saturating_sub(radius)..=(x + radius).min(width - 1);
     let rows = y.saturating_sub(radius)..=(y + radius).min(height - 1);
     rows.flat_map(move |ny| columns.clone().map(move |nx| (nx, ny)))
 }
 
-/// Fills all maps from values and squared errors per covered texel; NaN where nothing is known, and errors also where no surface is shown.
+/// Fills all maps from values and squared errors per covered texel. Values are NaN where nothing is known; errors are
+/// NaN there, too, and wherever a texel shows no surface of its own.
 pub(crate) fn fill(
     texels: &CoveredTexels<'_>,
     (values, variances): (&[Vec3], &[f32]),
@@ -198,18 +212,18 @@ pub(crate) fn fill(
     let mut filled = Vec::with_capacity(layout.texels);
     let mut errors = Vec::with_capacity(layout.texels);
     for map in &layout.maps {
-        let own = map.first..map.first + (map.width * map.height) as usize;
-        let all = fill_map((map.width, map.height), &known[own.clone()], &hidden[own.clone()], rings, stop);
-        filled.extend(all.iter().map(|known| known.map_or(Vec3::NAN, |known| known.value)));
-        let shown = all.iter().zip(&known[own]);
-        errors.extend(
-            shown.map(|(all, own)| all.filter(|_| own.is_some()).map_or(f32::NAN, |all| all.variance)),
-        );
+        let known = &known[map.places()];
+        let map = fill_map((map.width, map.height), known, &hidden[map.places()], rings, stop);
+        filled.extend(map.iter().map(|texel| texel.map_or(Vec3::NAN, |texel| texel.value)));
+        let error = |(texel, known): (&Option<TexelValue>, &Option<TexelValue>)| {
+            texel.filter(|_| known.is_some()).map_or(f32::NAN, |texel| texel.variance)
+        };
+        errors.extend(map.iter().zip(known).map(error));
     }
     (filled, errors)
 }
 
-/// `reach`: how far in texels filtering reads.
+/// Per texel of all maps, whether other geometry hides it. `reach` is how far filtering reads, in texels.
 fn hidden(layout: &LightmapLayout, texels: &[Texel], reach: u32) -> Vec<Hidden> {
     let mut hidden = vec![Hidden::No; layout.texels];
     for texel in texels.iter().filter(|texel| texel.is_hidden()) {
@@ -217,18 +231,18 @@ fn hidden(layout: &LightmapLayout, texels: &[Texel], reach: u32) -> Vec<Hidden> 
     }
     for texel in texels {
         let map = &layout.maps[texel.object as usize];
-        for (x, y) in around(map.width, map.height, texel.x, texel.y, reach) {
-            let other = &mut hidden[map.first + (y * map.width + x) as usize];
+        for (x, y) in texels_within(map.width, map.height, texel.x, texel.y, reach) {
+            let other = &mut hidden[map.texel(x, y).place()];
             if *other == Hidden::Deep {
                 let center = Vec2::new(x as f32 - texel.x as f32, y as f32 - texel.y as f32) + 0.5;
-                let reads = match &texel.footprint {
+                let is_read = match &texel.footprint {
                     Footprint::Whole(_) => true,
                     Footprint::Points(points) => {
                         points.iter().any(|point| (point.offset - center).abs().max_element() < reach as f32)
                     }
                     Footprint::Hidden => false,
                 };
-                if reads {
+                if is_read {
                     *other = Hidden::ReadFromTheOpen;
                 }
             }
@@ -256,16 +270,17 @@ mod tests {
         let filled = fill_map((8, 8), &known, &[Hidden::No; 64], 1, &CancelToken::default());
         for y in 2..6u32 {
             for x in 1..7u32 {
-                let TexelValue { value: found, variance, .. } = filled[(y * 8 + x) as usize].unwrap();
-                // What stays where it is keeps its error; what is moved or continued has at least that of errors that are all alike.
-                let kept = (3..6).contains(&x);
+                let TexelValue { value, variance, .. } = filled[(y * 8 + x) as usize].unwrap();
+                // A texel that is not moved keeps its error; any other has at least that of neighbours with the same
+                // error.
+                let is_unmoved = (3..6).contains(&x);
                 assert!(
-                    if kept { variance == 0.01 } else { variance > 0.0099 && variance < 0.1 },
+                    if is_unmoved { variance == 0.01 } else { variance > 0.0099 && variance < 0.1 },
                     "{variance}"
                 );
                 let expected = plane(x as f32 + 0.5, y as f32 + 0.5);
-                // The ridge bends the slope by a per cent or two.
-                assert!((found - expected).abs().max_element() < 0.06, "{x} {y}: {found} {expected}");
+                // The ridge reduces the slope by a per cent or two.
+                assert!((value - expected).abs().max_element() < 0.06, "{x} {y}: {value} {expected}");
             }
             assert!(filled[(y * 8) as usize].is_none());
         }

@@ -1,4 +1,5 @@
-//! From the light of covered texels to finished maps: gaps filled, seams closed, pages composed, the map's own resolution measured. Not the light.
+//! From the light of the covered texels to finished maps: gaps are filled, seams closed and pages composed, and the
+//! error of the map's resolution is measured. Not the computation of the light.
 
 pub(crate) mod baked_scene;
 pub(crate) mod fill;

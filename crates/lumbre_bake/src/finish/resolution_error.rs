@@ -1,7 +1,8 @@
-//! The error of the map's own resolution: what a bilinear look-up shows at points of the surfaces against what arrives there. Points spread
-//! evenly over all lit area are baked on their own, by the same direct light and the same gather as texels. Two independent halves of their
-//! samples make the square of the difference free of their noise (the product of both differences); what sampling has left in the map
-//! itself, by its own estimate, is taken away. Not the sampling error: that is `error_ledger`.
+//! The error of the map's own resolution: the difference between a bilinear look-up of the map at points of the
+//! surfaces and the light that arrives there. The points, spread evenly over the surfaces' area, are baked on their
+//! own, by the same direct light and the same gather as texels. The squared difference is the product of the
+//! differences to two independent halves of a point's samples, which is free of the samples' noise; the sampling error
+//! of the map itself, by its own estimate, is subtracted. Not the sampling error: that is `error_ledger`.
 
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
@@ -20,25 +21,25 @@ use crate::sources::light_sources::Sources;
 use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions, BakeReport};
 
-/// Of the rays of a bake, one part in so many; and what takes no time that anyone would notice.
-const SHARE: u64 = 20;
+/// The points get one part in this many of the bake's rays, and never fewer than take no noticeable time.
+const RAYS_DIVISOR: u64 = 20;
 const MIN_RAYS: u64 = 1 << 16;
 /// Fewest and most points.
 const POINTS: (u64, u64) = (256, 4096);
-/// Shadow rays of a point to each source and gather rays of each replicate; two replicates are a half.
+/// For each point, shadow rays to each source, and gather rays of each replicate. Two replicates make one half.
 const SHADOW_RAYS: u32 = 16;
 const GATHER_RAYS: u32 = 32;
-/// Rays that tell whether a point lies inside other geometry.
-const JUDGES: u32 = 8;
+/// Rays that test whether a point lies inside other geometry.
+const OPEN_TEST_RAYS: u32 = 8;
 
-/// A point, baked on its own.
+/// A point of a surface, baked on its own.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct DensePoint {
     pub triangle: u32,
     pub at: (f32, f32),
-    /// In the open, in the map.
+    /// Whether it lies in the open, and so counts.
     pub counts: bool,
-    /// Irradiance by direct light, and by bounces, by each half of the samples.
+    /// Irradiance by direct light and by bounces, as each half of the samples finds it.
     pub direct: [Vec3; 2],
     pub indirect: [Vec3; 2],
     /// Checks of patches against real bounces, and the sum of their differences.
@@ -47,7 +48,8 @@ pub(crate) struct DensePoint {
     pub rays: u64,
 }
 
-/// Points that the finished map is compared with; none if that is not asked for, or the time is up. `cache` is `None` where nothing bounces.
+/// The points that the finished map is compared with; none if the comparison is switched off, or the time is up.
+/// `cache` is `None` where nothing bounces.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -64,68 +66,71 @@ pub(crate) fn dense_points(
         return Ok(Vec::new());
     }
     monitor.stage(Stage::Resolution, report)?;
-    let light = Light { scene: sources.scene, sources, cache };
-    let points = light.at_points(report.rays, options, monitor)?;
+    let baker = PointBaker { scene: sources.scene, sources, cache };
+    let points = baker.bake_points(report.rays, options, monitor)?;
     report.rays += points.iter().map(|point| point.rays).sum::<u64>();
     Ok(points)
 }
 
-/// What light is asked for at points.
-struct Light<'a> {
+/// Computes the light at single points.
+struct PointBaker<'a> {
     scene: &'a BakeScene,
     sources: &'a Sources<'a>,
-    /// None where nothing bounces.
+    /// `None` where nothing bounces.
     cache: Option<&'a RadianceCache<'a>>,
 }
 
-impl Light<'_> {
-    /// Points in proportion to area, as many as a twentieth of `rays` pays for.
-    fn at_points(
+impl PointBaker<'_> {
+    /// Points in proportion to area, as many as a twentieth of `rays` allows.
+    fn bake_points(
         &self,
         rays: u64,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<DensePoint>, BakeError> {
-        let mut running = 0.0;
+        // Running sums of the triangles' areas, to choose triangles by.
+        let mut area = 0.0;
         let ends: Vec<f64> = self
             .scene
             .triangles
             .iter()
             .map(|triangle| {
-                running += if triangle.is_hidden_duplicate { 0.0 } else { f64::from(triangle.area) };
-                running
+                area += if triangle.is_hidden_duplicate { 0.0 } else { f64::from(triangle.area) };
+                area
             })
             .collect();
-        let of_gather = if self.cache.is_some() { GATHER_RAYS * REPLICATES as u32 } else { 0 };
-        let cost = u64::from(JUDGES + 2 * SHADOW_RAYS + of_gather);
-        let count = ((rays / SHARE).max(MIN_RAYS) / cost).clamp(POINTS.0, POINTS.1) as usize;
+        let gather_rays = if self.cache.is_some() { GATHER_RAYS * REPLICATES as u32 } else { 0 };
+        let cost = u64::from(OPEN_TEST_RAYS + 2 * SHADOW_RAYS + gather_rays);
+        let count = ((rays / RAYS_DIVISOR).max(MIN_RAYS) / cost).clamp(POINTS.0, POINTS.1) as usize;
         let sequence = Sequence::new(options.seed, Stream::ResolutionPoints, 0);
         let points = in_chunks(count, monitor, |index| {
             let [choice, u, v, _] = sequence.point(index as u32, 0);
-            let place = f64::from(choice) * running;
+            let place = f64::from(choice) * area;
             let triangle = ends.partition_point(|&end| end <= place).min(ends.len().saturating_sub(1));
-            self.at_point(triangle as u32, triangle_point(u, v), index as u32, options.seed)
+            self.bake_point(triangle as u32, triangle_point(u, v), index as u32, options.seed)
         })?;
         Ok(points)
     }
 
-    fn at_point(&self, triangle: u32, at: (f32, f32), index: u32, seed: u32) -> DensePoint {
+    fn bake_point(&self, triangle: u32, at: (f32, f32), index: u32, seed: u32) -> DensePoint {
         let mut point = DensePoint { triangle, at, ..DensePoint::default() };
         let footprint = FootprintPoint { triangle, at, offset: Vec2::splat(0.5) };
         let receiver = receiver(self.scene, &footprint);
-        let own = Sequence::new(seed, Stream::ResolutionLight, index);
-        point.rays += u64::from(JUDGES);
-        point.counts = self.is_open(&receiver, own);
+        let sequence = Sequence::new(seed, Stream::ResolutionLight, index);
+        point.rays += u64::from(OPEN_TEST_RAYS);
+        point.counts = self.is_open(&receiver, sequence);
         if !point.counts {
             return point;
         }
         for (half, direct) in point.direct.iter_mut().enumerate() {
-            let found = self.sources.irradiance(own.of(half as u32), SHADOW_RAYS, &|_, _| Some(receiver));
-            *direct = found.baked;
-            point.rays += u64::from(found.rays);
+            let sequence = sequence.of(half as u32);
+            let light = self.sources.irradiance(sequence, SHADOW_RAYS, &|_, _| Some(receiver));
+            *direct = light.baked;
+            point.rays += u64::from(light.rays);
         }
         let Some(cache) = self.cache else { return point };
-        // A texel of one point, in a tile and of an object of its own: so its samples are no texel's.
+        // A texel of this one point, with an object number and a seed of its own, so that it shares its samples with no
+        // other.
         let footprint = Footprint::Points(vec![footprint]);
         let texel = Texel { index: MapTexel(index), object: index, x: 0, y: 0, triangle, footprint };
         let mut gathered = GatherSums::default();
@@ -137,20 +142,21 @@ impl Light<'_> {
         point
     }
 
-    /// Not inside other geometry, nor where it is dark outside, which show nothing of it.
+    /// Whether a point lies neither inside other geometry nor on the dark outside of a closed level: the map does not
+    /// show those.
     fn is_open(&self, receiver: &Receiver, sequence: Sequence) -> bool {
-        let meets_inside = |ray: &u32| {
+        let hits_inside = |ray: &u32| {
             let [u, v, ..] = sequence.point(*ray, 0);
             let direction = cosine_about(receiver.geometric_normal, u, v);
             let hit = self.scene.classify_hit(receiver.origin, direction);
             matches!(hit, SurfaceHit::Inside | SurfaceHit::Back)
         };
-        2 * (0..JUDGES).filter(meets_inside).count() < JUDGES as usize
+        2 * (0..OPEN_TEST_RAYS).filter(hits_inside).count() < OPEN_TEST_RAYS as usize
     }
 }
 
-/// The finished map against the points. `variances` is the map's own estimate of what sampling left in it, per texel; NaN where nothing
-/// is known.
+/// Compares the finished map with the points. `variances` is the map's own estimate of its squared sampling error, per
+/// texel; NaN where nothing is known.
 pub(crate) fn compare(
     scene: &BakeScene,
     layout: &LightmapLayout,
@@ -159,7 +165,8 @@ pub(crate) fn compare(
     points: &[DensePoint],
 ) -> ResolutionReport {
     let counting = || points.iter().filter(|point| point.counts);
-    // What the patches bring too much, per unit of light by bounces, has been taken out of the map.
+    // The points read patches, whose excess light, known from checks, has been subtracted from the map: here, as a
+    // share of the light by bounces.
     let (mut difference, mut checked) = (Vec3::ZERO, Vec3::ZERO);
     for point in counting() {
         difference += point.differences;
@@ -181,15 +188,16 @@ pub(crate) fn compare(
         return ResolutionReport::default();
     }
     let square = squares.iter().sum::<f64>() / count;
-    let spread = squares.iter().map(|own| (own - square).powi(2)).sum::<f64>() / (count - 1.0);
-    let of_square = (spread / count).sqrt();
+    let spread = squares.iter().map(|other| (other - square).powi(2)).sum::<f64>() / (count - 1.0);
+    let square_error = (spread / count).sqrt();
     let error = square.max(0.0).sqrt();
-    // Of a root, by its derivative; next to 0 by the root of what the square may be.
-    let standard_error = of_square / (2.0 * error).max(of_square.sqrt()).max(f64::MIN_POSITIVE);
+    // The standard error of the root: by the root's derivative, and near 0, the root of the square's standard error.
+    let standard_error = square_error / (2.0 * error).max(square_error.sqrt()).max(f64::MIN_POSITIVE);
     ResolutionReport { points: squares.len(), error: error / mean, standard_error: standard_error / mean }
 }
 
-/// What the map shows at a point, bilinearly, and the variance that sampling left in it, as if texels were independent.
+/// What the map shows at a point by bilinear filtering, and the variance of that, as if the texels' errors were
+/// independent.
 fn look_up(
     scene: &BakeScene,
     layout: &LightmapLayout,
@@ -199,20 +207,19 @@ fn look_up(
 ) -> Option<(Vec3, f32)> {
     let triangle = &scene.triangles[point.triangle as usize];
     let map = &layout.maps[triangle.object as usize];
-    let [a, b, c] = triangle.uv;
-    let at = a + (b - a) * point.at.0 + (c - a) * point.at.1 - 0.5;
+    let at = triangle.place_on_map(point.at) - 0.5;
     if !at.is_finite() {
         return None;
     }
     let low = at.floor();
-    let part = at - low;
+    let fraction = at - low;
     let (mut light, mut variance) = (Vec3::ZERO, 0.0);
     for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-        let weight = (1.0 - (part.x - dx).abs()) * (1.0 - (part.y - dy).abs());
+        let weight = (1.0 - (fraction.x - dx).abs()) * (1.0 - (fraction.y - dy).abs());
         let x = (low.x + dx).clamp(0.0, (map.width - 1) as f32) as u32;
         let y = (low.y + dy).clamp(0.0, (map.height - 1) as f32) as u32;
-        let texel = map.first + (y * map.width + x) as usize;
-        // Nothing known is shown as black.
+        let texel = map.texel(x, y).place();
+        // Texels of which nothing is known are black in the map.
         light += weight * if filled[texel].is_finite() { filled[texel] } else { Vec3::ZERO };
         variance += weight * weight * if variances[texel].is_finite() { variances[texel] } else { 0.0 };
     }

@@ -1,4 +1,4 @@
-//! A finished map's light in two: what arrives straight from what shines, and what arrives by bounces. Not how either is found.
+//! Splits a finished map's light into direct light and light by bounces. Not how either is computed.
 
 use glam::Vec3;
 
@@ -8,14 +8,15 @@ use crate::coverage::covered_texels::CoveredTexels;
 use crate::direct_light::DirectLight;
 use crate::final_gather::rounds::IndirectLight;
 
-/// Irradiance of the texels of all maps in two, W/m²; NaN where nothing is known.
+/// The two parts of the irradiance, per texel of all maps, W/m²; NaN where nothing is known.
 pub(crate) struct Separate {
     pub direct: Vec<Vec3>,
     pub bounced: Vec<Vec3>,
 }
 
-/// Divides the finished light of all maps (filled, seams closed) as the light of the covered texels divides, channel by channel. What was done to the
-/// whole is so done to both in proportion: neither is negative, and they add up to the map.
+/// Splits the finished light of all maps (filled, seams closed) in the proportion of the covered texels' direct light
+/// and light by bounces, channel by channel. So whatever finishing did to the whole it does to both parts: neither is
+/// negative, and they add up to the map.
 pub(crate) fn separate(
     texels: &CoveredTexels<'_>,
     (direct, bounced): (&DirectLight, &IndirectLight),
@@ -23,19 +24,20 @@ pub(crate) fn separate(
     rings: u32,
     stop: &CancelToken,
 ) -> Separate {
-    let unknown = vec![0.0; texels.list.len()];
-    let filled = |light: &[Vec3]| fill(texels, (light, &unknown), rings, stop).0;
-    let straight: Vec<Vec3> = direct.texels.iter().map(|own| own.baked).collect();
-    let by_bounces = match bounced.light.is_empty() {
+    // The errors that come out are not used.
+    let no_errors = vec![0.0; texels.list.len()];
+    let filled = |light: &[Vec3]| fill(texels, (light, &no_errors), rings, stop).0;
+    let direct: Vec<Vec3> = direct.texels.iter().map(|direct| direct.baked).collect();
+    let bounced = match bounced.light.is_empty() {
         true => vec![Vec3::ZERO; texels.list.len()],
         false => bounced.light.clone(),
     };
-    let (straight, by_bounces) = (filled(&straight), filled(&by_bounces));
-    let divide = |((&whole, &direct), &bounced): ((&Vec3, &Vec3), &Vec3)| {
+    let (direct, bounced) = (filled(&direct), filled(&bounced));
+    let split = |((&whole, &direct), &bounced): ((&Vec3, &Vec3), &Vec3)| {
         let share = direct / (direct + bounced).max(Vec3::splat(f32::MIN_POSITIVE));
         let direct = whole * share.clamp(Vec3::ZERO, Vec3::ONE);
         (direct, whole - direct)
     };
-    let (direct, bounced) = finished.iter().zip(&straight).zip(&by_bounces).map(divide).unzip();
+    let (direct, bounced) = finished.iter().zip(&direct).zip(&bounced).map(split).unzip();
     Separate { direct, bounced }
 }

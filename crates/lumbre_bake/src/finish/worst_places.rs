@@ -1,4 +1,5 @@
-//! Where in a level the stated error is largest, so that an artist finds the room and the objects. Not the error: that is `error_ledger`.
+//! Where in a level the stated error is largest, so that an artist finds the room and the objects. Not the error
+//! itself: that is `error_ledger`.
 
 use std::collections::BTreeMap;
 
@@ -8,24 +9,25 @@ use crate::WorstPlace;
 use crate::coverage::footprint::{Texel, receiver};
 use crate::scene::{BakeScene, SceneObject};
 
-/// Places are cubes of this share of the level's longest side.
-const PLACE: f32 = 1.0 / 8.0;
-/// Places with fewer of the open texels are not told.
+/// Side of the cubes into which the level is divided, as a share of its longest side.
+const CUBE_SIDE: f32 = 1.0 / 8.0;
+/// Places with less than this share of the open texels are not reported.
 const MIN_TEXELS: f64 = 0.01;
 const MAX_PLACES: usize = 3;
 const MAX_OBJECTS: usize = 2;
 
-/// What is found in one place.
+/// Sums over the texels in one cube.
 #[derive(Default)]
 struct Place {
     texels: u32,
     position: DVec3,
     squares: f64,
-    of_objects: BTreeMap<u32, f64>,
+    /// The part of `squares` that belongs to each object.
+    object_squares: BTreeMap<u32, f64>,
 }
 
-/// Where the error is largest, the worst first. `squares` are squared errors of the covered texels, relative to the light around them; `whole` is
-/// what is stated for all of them together.
+/// The places where the error is largest, the worst first. `squares` are the squared errors of the covered texels,
+/// relative to the light around them; `whole` is the error that is stated for the whole map.
 pub(crate) fn worst_places(
     scene: &BakeScene,
     objects: &[SceneObject],
@@ -35,7 +37,7 @@ pub(crate) fn worst_places(
 ) -> Vec<WorstPlace> {
     let corners = || scene.triangles.iter().flat_map(|triangle| triangle.corners);
     let (low, high) = corners().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
-    let side = PLACE * (high - low).max_element();
+    let side = CUBE_SIDE * (high - low).max_element();
     let mut places: BTreeMap<[i32; 3], Place> = BTreeMap::new();
     let mut open = 0u32;
     for (texel, &square) in texels.iter().zip(squares).filter(|(texel, _)| !texel.is_hidden()) {
@@ -46,27 +48,28 @@ pub(crate) fn worst_places(
         place.texels += 1;
         place.position += position.as_dvec3();
         place.squares += f64::from(square);
-        *place.of_objects.entry(texel.object).or_default() += f64::from(square);
+        *place.object_squares.entry(texel.object).or_default() += f64::from(square);
         open += 1;
     }
-    // What chance leaves in single texels falls out of the whole: the places' errors add up to that.
+    // The errors of single texels contain chance that cancels in the whole: they are scaled so that they add up to the
+    // whole's.
     let all: f64 = places.values().map(|place| place.squares).sum();
     let scale = f64::from(open) * whole.powi(2) / all.max(f64::MIN_POSITIVE);
-    let told = |place: Place| {
+    let worst_place = |place: Place| {
         let count = f64::from(place.texels);
         let error = (scale * place.squares / count).sqrt();
         let texels = count / f64::from(open);
         if texels < MIN_TEXELS || error <= whole {
             return None;
         }
-        let mut worst: Vec<(u32, f64)> = place.of_objects.into_iter().collect();
-        worst.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let mut worst_objects: Vec<(u32, f64)> = place.object_squares.into_iter().collect();
+        worst_objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let name = |&(object, _): &(u32, f64)| objects.get(object as usize).map(|object| object.name.clone());
-        let objects = worst.iter().take(MAX_OBJECTS).filter_map(name).collect();
+        let objects = worst_objects.iter().take(MAX_OBJECTS).filter_map(name).collect();
         let center = scene.space.world((place.position / count).as_vec3()).to_array();
         Some(WorstPlace { center, error, texels, objects })
     };
-    let mut worst: Vec<WorstPlace> = places.into_values().filter_map(told).collect();
+    let mut worst: Vec<WorstPlace> = places.into_values().filter_map(worst_place).collect();
     worst.sort_by(|a, b| b.error.total_cmp(&a.error));
     worst.truncate(MAX_PLACES);
     worst

@@ -155,13 +155,9 @@ impl<'a> IndirectChange<'a> {
                 return (Vec3::ZERO, Vec3::ZERO);
             }
             let sequence = Sequence::new(options.seed, Stream::ChangedPatches, index as u32);
-            let triangle = &self.scene.triangles[patch.triangle as usize];
             let point = |x: f32, y: f32| {
-                let (u, v) = patches.point(patch, triangle_point(x, y));
-                let position = triangle.position(u, v);
-                let origin = self.scene.off_surface(patch.triangle, patch.side, position);
-                let normal = triangle.side_normal(patch.side);
-                Some(Receiver { position, origin, geometric_normal: normal, normal })
+                let at = patches.point(patch, triangle_point(x, y));
+                Some(Receiver::on_facet(self.scene, patch.triangle, patch.side, at))
             };
             self.seen(sequence, &|_, x, y| point(x, y), light).means().into()
         })?;

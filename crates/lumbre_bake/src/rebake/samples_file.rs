@@ -15,7 +15,8 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 
 use super::samples::{Content, Samples, TexelSamples};
-use crate::checkpoint::{checkpoint_file, record};
+use crate::checkpoint::record;
+use crate::checkpoint::replace_file::replace_file;
 use crate::scene::Canonical;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
@@ -86,14 +87,13 @@ impl Samples {
     /// [`SamplesError::Io`]; what was there is then as it was.
     pub fn write(&self, path: &Path) -> Result<(), SamplesError> {
         let content = packed(&record::written(&self.0).map_err(io::Error::other)?)?;
-        let beside = checkpoint_file::temporary(path);
-        let written = (|| {
+        replace_file(path, |temporary| {
             let mut file = loop {
                 // Not truncated before it is ours: another process may be writing it.
-                let file = OpenOptions::new().write(true).create(true).truncate(false).open(&beside)?;
+                let file = OpenOptions::new().write(true).create(true).truncate(false).open(temporary)?;
                 lock(&file)?;
                 // Whoever had it has renamed it meanwhile: then it is the finished file.
-                if is_at(&file, &beside)? {
+                if is_at(&file, temporary)? {
                     break file;
                 }
             };
@@ -103,13 +103,9 @@ impl Samples {
             file.write_all(blake3::hash(&content).as_bytes())?;
             file.write_all(&content)?;
             file.sync_all()?;
-            std::fs::rename(&beside, path)
-        })();
-        if written.is_err() {
-            // Half-written; if it cannot be removed either, the first error is the one to tell.
-            let _ = checkpoint_file::remove_if_there(&beside);
-        }
-        Ok(written?)
+            Ok(file)
+        })?;
+        Ok(())
     }
 }
 

@@ -1,6 +1,7 @@
 //! Where every object's texels are: its own `uv1` where it has sound ones, an unwrap where not, and the size of its map.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DAffine3, Vec2, Vec3};
@@ -32,6 +33,11 @@ impl MapLayout {
     /// The texel in a column and a row.
     pub fn texel(&self, x: u32, y: u32) -> MapTexel {
         MapTexel::new(self.first + (y * self.width + x) as usize)
+    }
+
+    /// The places of its texels in lists per texel of all maps.
+    pub fn places(&self) -> Range<usize> {
+        self.first..self.first + (self.width * self.height) as usize
     }
 }
 

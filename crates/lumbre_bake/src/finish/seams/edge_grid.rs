@@ -1,5 +1,5 @@
-//! Which edges are near which: a grid for each power of two of length, so that every edge lies in a few cells of its own
-//! size. Not whether they meet.
+//! Finds edges near each other: one grid for each power of two of length, so that every edge lies in a few cells of
+//! about its own size. Not whether the edges meet: that is `samples`.
 
 use std::collections::HashMap;
 
@@ -13,16 +13,16 @@ struct Level {
     cells: HashMap<[i64; 3], Vec<u32>>,
 }
 
-/// All edges.
+/// All edges, by length class and cell.
 pub(crate) struct EdgeGrid<'a> {
     edges: &'a [Edge],
-    /// How far apart edges count as near, canonical units.
+    /// Distance up to which edges count as near, canonical units.
     reach: f64,
-    /// Ascending length classes.
+    /// The length classes in ascending order.
     levels: Vec<(i32, Level)>,
 }
 
-/// Most edges that one is compared with: stacked copies of one object must not take quadratic time.
+/// Most edges that one edge is compared with: stacked copies of one object must not take quadratic time.
 const MAX_CANDIDATES: usize = 4096;
 
 impl<'a> EdgeGrid<'a> {
@@ -42,34 +42,33 @@ impl<'a> EdgeGrid<'a> {
         Self { edges, reach, levels: levels.collect() }
     }
 
-    /// Edges that may touch an edge, each pair once: the longer ones, and of its own class those before it. Ascending.
-    ///
-    /// With them comes whether there may be more.
+    /// The edges that may touch an edge, in ascending order, so that each pair is found once: edges of longer classes,
+    /// and those of its own class with a smaller index. Also returns whether there may be more than were found.
     pub fn near(&self, index: u32) -> (Vec<u32>, bool) {
         let edge = &self.edges[index as usize];
-        let own = class(edge, self.reach);
-        let mut found = Vec::new();
-        for (class, level) in self.levels.iter().filter(|(class, _)| *class >= own) {
+        let own_class = class(edge, self.reach);
+        let mut near = Vec::new();
+        for (class, level) in self.levels.iter().filter(|(class, _)| *class >= own_class) {
             for cell in cells(edge, level.cell, self.reach) {
                 let there = level.cells.get(&cell).into_iter().flatten().copied();
-                found.extend(there.filter(|&other| *class > own || other < index).take(MAX_CANDIDATES));
+                near.extend(there.filter(|&other| *class > own_class || other < index).take(MAX_CANDIDATES));
             }
         }
-        found.sort_unstable();
-        found.dedup();
-        let crowded = found.len() >= MAX_CANDIDATES;
-        found.truncate(MAX_CANDIDATES);
-        (found, crowded)
+        near.sort_unstable();
+        near.dedup();
+        let is_crowded = near.len() >= MAX_CANDIDATES;
+        near.truncate(MAX_CANDIDATES);
+        (near, is_crowded)
     }
 }
 
-/// Exponent of the power of two that is not shorter.
+/// The length class of an edge: the exponent of the next power of two.
 fn class(edge: &Edge, reach: f64) -> i32 {
-    // Canonical lengths are in about [2^-149, 4]: the cast is exact.
+    // Canonical lengths are about in [2^-149, 4], so the cast is exact.
     (edge.length() + 2.0 * reach).log2().ceil() as i32
 }
 
-/// The cells that an edge's box touches: at most three along each axis where it is not longer than a cell.
+/// The cells that an edge's bounding box touches: at most three along each axis if the edge is no longer than a cell.
 fn cells(edge: &Edge, cell: f64, reach: f64) -> Vec<[i64; 3]> {
     let [a, b] = edge.ends;
     let place = |point: DVec3| (point / cell).floor().to_array().map(|x| x as i64);
@@ -98,7 +97,7 @@ mod tests {
             normals: [Vec3::Y; 2],
             inward: Vec3::Z,
         };
-        // A long edge, cut into a hundred short ones along it, and as many far away.
+        // A long edge, a hundred short ones along it, and as many far away.
         let mut edges = vec![edge([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0])];
         for i in 0..100 {
             let x = -1.0 + f64::from(i) * 0.02;
@@ -114,12 +113,12 @@ mod tests {
             assert_eq!(with_the_long.count(), 1);
         }
         assert!((0..edges.len() as u32).all(|index| !grid.near(index).1));
-        // Neighbours only: far from all pairs.
+        // Only neighbours: far fewer than all pairs.
         assert!(pairs.len() < 100 + 2 * 100 * 4, "{}", pairs.len());
-        // Too many in one place are told.
+        // Too many in one place are reported.
         let stacked = vec![edges[0]; MAX_CANDIDATES + 2];
         let grid = EdgeGrid::new(&stacked, 1e-6);
-        let (found, crowded) = grid.near(MAX_CANDIDATES as u32 + 1);
-        assert!(crowded && found.len() == MAX_CANDIDATES && !grid.near(5).1);
+        let (near, is_crowded) = grid.near(MAX_CANDIDATES as u32 + 1);
+        assert!(is_crowded && near.len() == MAX_CANDIDATES && !grid.near(5).1);
     }
 }

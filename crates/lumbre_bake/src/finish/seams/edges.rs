@@ -1,5 +1,5 @@
-//! The borders of charts: edges of triangles without a neighbour at the same place of the map. Not which of them meet in
-//! space: that is `samples`.
+//! The borders of charts: edges whose position, both in space and on the map, no other triangle shares. Not which of
+//! them meet in space: that is `samples`.
 
 use std::collections::HashMap;
 
@@ -17,13 +17,14 @@ pub(crate) struct Edge {
     pub uv: [Vec2; 2],
     /// Unit shading normals at the ends.
     pub normals: [Vec3; 2],
-    /// Unit, in the triangle's plane, square to the edge, into the triangle.
+    /// Unit, in the triangle's plane, perpendicular to the edge and pointing into the triangle.
     pub inward: Vec3,
 }
 
-/// The borders of all charts, in the order of their triangles. Edges that the map draws to a point have no samples and are left out.
+/// The borders of all charts, in the order of their triangles. Edges that the map collapses to a point would have no
+/// samples and are left out.
 pub(crate) fn borders(scene: &BakeScene) -> Vec<Edge> {
-    // A corner is one where its object, place in space and place in the map are, bit by bit.
+    // Two corners are the same if their object, position and map coordinates are equal bit by bit.
     let mut corners: HashMap<[u32; 6], u32> = HashMap::new();
     let mut sides: Vec<([u32; 2], u32)> = Vec::new();
     for (index, triangle) in scene.triangles.iter().enumerate() {
@@ -32,7 +33,7 @@ pub(crate) fn borders(scene: &BakeScene) -> Vec<Edge> {
             continue;
         }
         let ids: [u32; 3] = std::array::from_fn(|corner| {
-            // -0 and 0 are one place.
+            // Adding 0 turns -0 into 0, so that both are one place.
             let [x, y, z] = (triangle.corners[corner] + Vec3::ZERO).to_array().map(f32::to_bits);
             let [u, v] = (triangle.uv[corner] + Vec2::ZERO).to_array().map(f32::to_bits);
             let next = corners.len() as u32;
@@ -40,17 +41,18 @@ pub(crate) fn borders(scene: &BakeScene) -> Vec<Edge> {
         });
         for corner in 0..3 {
             let (from, to) = (ids[corner], ids[(corner + 1) % 3]);
-            // Fewer than 2^28 triangles: three times that fits.
+            // There are fewer than 2^28 triangles, so that their 3 corners fit.
             sides.push(([from.min(to), from.max(to)], index as u32 * 3 + corner as u32));
         }
     }
     sides.sort_unstable();
-    let alone = sides.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1);
-    let mut borders: Vec<u32> = alone.collect();
+    let unshared = sides.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1);
+    let mut borders: Vec<u32> = unshared.collect();
     borders.sort_unstable();
     borders.into_iter().filter_map(|side| edge(scene, side / 3, (side % 3) as usize)).collect()
 }
 
+/// The edge of a triangle from a corner to the next; `None` if it is collapsed in space or on the map.
 fn edge(scene: &BakeScene, index: u32, corner: usize) -> Option<Edge> {
     let triangle = &scene.triangles[index as usize];
     let next = (corner + 1) % 3;
@@ -69,12 +71,12 @@ fn edge(scene: &BakeScene, index: u32, corner: usize) -> Option<Edge> {
 }
 
 impl Edge {
-    /// Canonical units.
+    /// Its length in space, canonical units.
     pub fn length(&self) -> f64 {
         (self.ends[1] - self.ends[0]).length()
     }
 
-    /// Texels of the map along it.
+    /// Its length on the map, in texels.
     pub fn texels(&self) -> f32 {
         (self.uv[1] - self.uv[0]).length()
     }

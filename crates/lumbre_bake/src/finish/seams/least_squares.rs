@@ -1,12 +1,13 @@
-//! The least squares behind closed seams, channel by channel, by preconditioned conjugate gradients:
+//! The least-squares problem behind closed seams, solved channel by channel with preconditioned conjugate gradients:
 //!
 //! ```text
 //!   minimise  Σ over samples (A - B)² / (λ (variance of A + variance of B))  +  Σ over texels change² / variance
 //!   with      |change| <= 2 √variance,  value >= 0
 //! ```
 //!
-//! A texel's variance is its stated error's plus what its own place in the map cannot tell: half a texel of the light's
-//! slope around it. What is well known and even therefore stays. Not the choice of the samples.
+//! A and B are the values that filtering reads on both sides. A texel's variance is that of its stated error plus the
+//! uncertainty of its position: half a texel of the light's slope around it. So texels that are well known, in even
+//! light, stay as they are. Not the choice of the samples: that is `samples`.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -15,26 +16,28 @@ use super::samples::{Reading, Sample};
 use super::{MapValues, Maps, NO_CHART};
 use crate::cancel_token::CancelToken;
 use crate::conjugate_gradients::{self, System};
+use crate::finish::fill::texels_within;
 use crate::report::SeamReport;
 use crate::texel_index::MapTexel;
 
-/// λ: a jump between two texels that are equally uncertain shrinks to a fiftieth or less.
+/// λ: a jump between two equally uncertain texels shrinks to a fiftieth or less.
 const STIFFNESS: f64 = 0.02;
-/// Error of a texel that states none, relative to the mean: keeps the sums finite, and moves nothing (see the limit).
-const FLOOR: f64 = 1e-4;
-/// Half a texel of slope, of the range of the nine texels around: two texels wide along both axes.
+/// An error added to that of every texel, relative to the mean: keeps the sums finite where a texel states none. It
+/// moves nothing, as the limit of the change does not contain it.
+const ERROR_FLOOR: f64 = 1e-4;
+/// Half a texel of the light's slope, as a share of the range over the 3 x 3 texels around, which is two texels wide.
 const HALF_A_TEXEL: f64 = 0.25;
-/// Standard errors that a texel may be moved by.
-const LIMIT: f64 = 2.0;
-/// Variance of a texel beside a chart, which shows no surface of its own, over that of its neighbours.
-const BESIDE: f64 = 4.0;
-/// Relative residual at which conjugate gradients end, and their most steps.
+/// How many standard errors a texel may be moved by.
+const MAX_CHANGE: f64 = 2.0;
+/// Variance of a texel beside a chart, which shows no surface of its own, relative to that of its neighbours.
+const BESIDE_CHART: f64 = 4.0;
+/// Relative residual at which conjugate gradients stop, and the most steps they take.
 const RESIDUAL: f64 = 1e-6;
 const MAX_STEPS: usize = 400;
-/// Times that texels at their limit are taken out and the others solved again.
+/// How many times the system is solved, each time without the texels that have reached their limit.
 const ACTIVE_SETS: u32 = 6;
 
-/// How long the solution is sought.
+/// How much work the solution may take.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patience {
     steps: usize,
@@ -43,7 +46,7 @@ pub(crate) struct Patience {
 
 impl Patience {
     pub const WHOLE: Self = Self { steps: MAX_STEPS, active_sets: ACTIVE_SETS };
-    /// When the time is up: a few steps close most of a jump, which is between texels that lie next to each other.
+    /// For when the time is up: a few steps close most of a jump, as it is only between neighbouring texels.
     pub const LATE: Self = Self { steps: 12, active_sets: 2 };
 }
 
@@ -51,11 +54,11 @@ impl Patience {
 pub(crate) struct Unknowns {
     /// Ascending.
     texels: Vec<MapTexel>,
-    /// Per texel and channel: the stated error's and the map's own.
+    /// Per texel and channel, the variance of the stated error and of the texel's position together.
     variances: Vec<DVec3>,
 }
 
-/// A sample in terms of unknowns: coefficients of A - B.
+/// A sample as a linear equation: A - B as a combination of unknowns.
 struct Equation {
     unknowns: [u32; 8],
     coefficients: [f64; 8],
@@ -76,8 +79,9 @@ impl Unknowns {
         Self { texels, variances }
     }
 
-    /// Moves the texels, and adds the square of how far to their errors: on average that is the most that they can be farther off than before, as
-    /// what moves them is the light on the other side and not their own error. Edges are left for the caller to say.
+    /// Moves the texels, and adds the squares of their changes to their errors: on average that is the most by which
+    /// they can become worse, as what moves them is the light on the other side and not their own error. The number of
+    /// edges in the report is left to the caller.
     pub fn solve(
         &self,
         samples: &[Sample],
@@ -93,17 +97,17 @@ impl Unknowns {
             .map(|channel| {
                 let values: Vec<f64> =
                     self.texels.iter().map(|&texel| f64::from(filled[texel.place()][channel])).collect();
-                let limits: Vec<f64> = self.variances.iter().map(|variance| variance[channel]).collect();
-                let changes = Channel::new(&equations, &values, &limits, mean, stop).solve(patience);
+                let variances: Vec<f64> = self.variances.iter().map(|variance| variance[channel]).collect();
+                let changes = Channel::new(&equations, &values, &variances, mean, stop).solve(patience);
                 let moved: Vec<f64> = values
                     .iter()
                     .zip(&changes)
                     .map(|(value, change)| f64::from((value + change).max(0.0) as f32))
                     .collect();
                 let jumps = [&values, &moved].map(|values| squared_jump(&equations, values));
-                // Limits that cut the changes might leave a jump that is worse than what was there.
-                let better = jumps[1] <= jumps[0] && moved.iter().all(|value| value.is_finite());
-                if better { (moved, jumps) } else { (values, [jumps[0]; 2]) }
+                // Clamping the changes might leave a larger jump than before; then nothing is moved.
+                let is_better = jumps[1] <= jumps[0] && moved.iter().all(|value| value.is_finite());
+                if is_better { (moved, jumps) } else { (values, [jumps[0]; 2]) }
             })
             .collect();
         let mut report = SeamReport::default();
@@ -125,6 +129,7 @@ impl Unknowns {
         report
     }
 
+    /// The equation of a sample.
     fn equation(&self, sample: &Sample) -> Equation {
         let (mut unknowns, mut coefficients) = ([0; 8], [0.0; 8]);
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
@@ -144,11 +149,12 @@ impl Unknowns {
 }
 
 impl Equation {
-    /// A - B.
+    /// A - B for given values of the unknowns.
     fn apply(&self, values: &[f64]) -> f64 {
         self.unknowns.iter().zip(self.coefficients).map(|(&i, c)| c * values[i as usize]).sum()
     }
 
+    /// Adds `factor` times the coefficients to the entries of the unknowns.
     fn add_transposed(&self, factor: f64, sums: &mut [f64]) {
         for (&unknown, coefficient) in self.unknowns.iter().zip(self.coefficients) {
             sums[unknown as usize] += factor * coefficient;
@@ -156,7 +162,7 @@ impl Equation {
     }
 }
 
-/// Mean over the seams' length.
+/// The mean squared jump over the length of the seams.
 fn squared_jump(equations: &[Equation], values: &[f64]) -> f64 {
     let (mut sum, mut length) = (0.0, 0.0);
     for equation in equations {
@@ -166,7 +172,7 @@ fn squared_jump(equations: &[Equation], values: &[f64]) -> f64 {
     if length > 0.0 { sum / length } else { 0.0 }
 }
 
-/// How far each channel of a texel may be off, squared.
+/// The variance of each channel of a texel: how far it may be off, squared.
 fn variance(maps: &Maps<'_>, charts: &[u32], shown: &MapValues<'_>, texel: MapTexel) -> DVec3 {
     let MapValues { light: filled, variances } = shown;
     let Some(map) = maps.layout.maps.iter().rev().find(|map| map.first <= texel.place()) else {
@@ -174,40 +180,39 @@ fn variance(maps: &Maps<'_>, charts: &[u32], shown: &MapValues<'_>, texel: MapTe
     };
     let local = texel.0 - map.first as u32;
     let (x, y) = (local % map.width, local / map.width);
-    let own = charts[texel.place()];
+    let chart = charts[texel.place()];
     let (mut low, mut high, mut stated) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
-    for ny in y.saturating_sub(1)..=(y + 1).min(map.height - 1) {
-        for nx in x.saturating_sub(1)..=(x + 1).min(map.width - 1) {
-            let other = map.first + (ny * map.width + nx) as usize;
-            let same = charts[other] != NO_CHART && (own == NO_CHART || charts[other] == own);
-            if same && filled[other].is_finite() {
-                (low, high) = (low.min(filled[other]), high.max(filled[other]));
-                // NaN, of a texel without a surface, is never the larger one.
-                stated = stated.max(variances[other]);
-            }
+    for (nx, ny) in texels_within(map.width, map.height, x, y, 1) {
+        let other = map.texel(nx, ny).place();
+        // A texel beside a chart has the range and the error of whatever charts lie around it.
+        let is_same_chart = charts[other] != NO_CHART && (chart == NO_CHART || charts[other] == chart);
+        if is_same_chart && filled[other].is_finite() {
+            (low, high) = (low.min(filled[other]), high.max(filled[other]));
+            // The error of a texel that shows no surface is NaN, which `max` ignores.
+            stated = stated.max(variances[other]);
         }
     }
-    if own != NO_CHART {
+    if chart != NO_CHART {
         stated = variances[texel.place()].max(0.0);
     }
     let range = if low.x <= high.x { (high - low).as_dvec3() } else { DVec3::ZERO };
     let slope = range * HALF_A_TEXEL;
     let variance = slope * slope + f64::from(stated);
     let variance = if variance.is_finite() { variance } else { DVec3::ZERO };
-    if own == NO_CHART { variance * BESIDE } else { variance }
+    if chart == NO_CHART { variance * BESIDE_CHART } else { variance }
 }
 
-/// One channel's system for the changes.
+/// The linear system for the changes of one channel.
 struct Channel<'a> {
     equations: &'a [Equation],
     /// Weight of each equation, and its jump before any change.
     weights: Vec<f64>,
     jumps: Vec<f64>,
-    /// Least and largest change of each texel.
+    /// Smallest and largest change of each texel.
     bounds: Vec<[f64; 2]>,
-    /// 1 / variance.
+    /// Per texel, 1 / variance.
     stiffness: Vec<f64>,
-    /// Of the system's diagonal, 1 over it.
+    /// Per texel, the reciprocal of the system's diagonal.
     preconditioner: Vec<f64>,
     stop: &'a CancelToken,
 }
@@ -220,18 +225,18 @@ impl<'a> Channel<'a> {
         mean: f64,
         stop: &'a CancelToken,
     ) -> Self {
-        let floor = (FLOOR * mean).powi(2);
+        let floor = (ERROR_FLOOR * mean).powi(2);
         let stiffness: Vec<f64> = variances.iter().map(|variance| 1.0 / (variance + floor)).collect();
         let mut diagonal = stiffness.clone();
         let (mut weights, mut jumps) = (Vec::new(), Vec::new());
         for equation in equations {
-            let both: f64 = equation
+            let variance_of_both: f64 = equation
                 .unknowns
                 .iter()
                 .zip(equation.coefficients)
                 .map(|(&unknown, c)| c.abs() / stiffness[unknown as usize])
                 .sum();
-            let weight = 1.0 / (STIFFNESS * both);
+            let weight = 1.0 / (STIFFNESS * variance_of_both);
             for (&unknown, coefficient) in equation.unknowns.iter().zip(equation.coefficients) {
                 diagonal[unknown as usize] += weight * coefficient * coefficient;
             }
@@ -239,7 +244,7 @@ impl<'a> Channel<'a> {
             jumps.push(equation.apply(values));
         }
         let bound = |(value, variance): (&f64, &f64)| {
-            let limit = LIMIT * variance.sqrt();
+            let limit = MAX_CHANGE * variance.sqrt();
             [-limit.min(*value), limit]
         };
         Self {
@@ -253,38 +258,40 @@ impl<'a> Channel<'a> {
         }
     }
 
-    /// The changes within their bounds: those at a bound are held there and the others solved again.
+    /// The changes within their bounds. Changes that exceed a bound are held at it, and the others are solved for
+    /// again.
     fn solve(&self, patience: Patience) -> Vec<f64> {
         let count = self.stiffness.len();
         let mut held = vec![false; count];
         let mut changes = vec![0.0; count];
         for _ in 0..patience.active_sets {
             self.solve_free(&held, &mut changes, patience.steps);
-            let mut cut = false;
+            let mut any_clamped = false;
             for ((change, [low, high]), held) in changes.iter_mut().zip(&self.bounds).zip(&mut held) {
                 let within = change.clamp(*low, *high);
                 if within != *change {
-                    (*change, *held, cut) = (within, true, true);
+                    (*change, *held, any_clamped) = (within, true, true);
                 }
             }
-            if !cut {
+            if !any_clamped {
                 break;
             }
         }
         changes
     }
 
-    /// Solves for the changes that are not held, starting from what they are.
+    /// Solves for the changes that are not held, starting from their current values.
     fn solve_free(&self, held: &[bool], changes: &mut [f64], most_steps: usize) {
         let mut residual: Vec<f64> =
             self.gradient(changes, Some(&self.jumps)).into_iter().map(|value| -value).collect();
-        without(held, &mut residual);
+        zero_held(held, &mut residual);
         let energy: f64 = residual.iter().zip(&self.preconditioner).map(|(r, p)| r * (r * p)).sum();
-        let system = Free { channel: self, held, most_steps, enough: energy * RESIDUAL * RESIDUAL };
+        let system = Free { channel: self, held, most_steps, small_energy: energy * RESIDUAL * RESIDUAL };
         conjugate_gradients::solve(&system, changes, residual);
     }
 
-    /// The system times changes; with the jumps that there are, half the gradient of what is minimised.
+    /// The system's matrix times the changes `x`; with the jumps before any change, half the gradient of what is
+    /// minimised.
     fn gradient(&self, x: &[f64], jumps: Option<&[f64]>) -> Vec<f64> {
         let mut product: Vec<f64> = x.iter().zip(&self.stiffness).map(|(x, s)| x * s).collect();
         for (index, equation) in self.equations.iter().enumerate() {
@@ -295,19 +302,19 @@ impl<'a> Channel<'a> {
     }
 }
 
-/// The system of the changes that are not held.
+/// The system restricted to the changes that are not held.
 struct Free<'a> {
     channel: &'a Channel<'a>,
     held: &'a [bool],
     most_steps: usize,
-    /// Energy of the residual that is small enough.
-    enough: f64,
+    /// Energy of the residual at which the solution is good enough.
+    small_energy: f64,
 }
 
 impl System for Free<'_> {
     fn multiply(&self, x: &[f64]) -> Vec<f64> {
         let mut product = self.channel.gradient(x, None);
-        without(self.held, &mut product);
+        zero_held(self.held, &mut product);
         product
     }
 
@@ -316,13 +323,13 @@ impl System for Free<'_> {
     }
 
     fn goes_on(&self, steps: usize, _: &[f64], energy: f64) -> bool {
-        let is_enough = energy <= self.enough || !energy.is_finite();
+        let is_enough = energy <= self.small_energy || !energy.is_finite();
         steps < self.most_steps && !is_enough && !self.channel.stop.is_cancelled()
     }
 }
 
-/// Takes what is held out of a vector.
-fn without(held: &[bool], vector: &mut [f64]) {
+/// Sets the entries of a vector that are held to zero.
+fn zero_held(held: &[bool], vector: &mut [f64]) {
     for (value, _) in vector.iter_mut().zip(held).filter(|(_, held)| **held) {
         *value = 0.0;
     }

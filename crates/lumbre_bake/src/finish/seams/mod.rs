@@ -1,14 +1,16 @@
-//! Seams closed by least squares: where two borders of charts lie in one place and their surfaces join smoothly, the texels
-//! that bilinear filtering reads there are moved, by no more than they may be wrong, until both sides show the same light.
-//! Within a map, across maps and across objects. Not the filling beside charts: that is `fill`.
+//! Closes seams by least squares: where two chart borders lie in one place and their surfaces join smoothly, the texels
+//! that bilinear filtering reads there are moved until both sides show the same light, though by no more than their
+//! errors allow. Within a map, across maps and across objects. Not the continuation of charts into empty texels: that
+//! is `fill`.
 //!
 //! ```text
-//!   borders of charts ─► pairs in one place ─► samples, two per texel ─────────────► least squares ─► texels
-//!                        (also parts of edges)  (normals agree, nothing in between)   (conjugate gradients)
+//!   chart borders ─► pairs in one place ─► samples, two per texel ────────────────► least squares ─► texels
+//!                    (also parts of edges)  (normals agree, nothing in between)      (conjugate gradients)
 //! ```
 //!
 //! After Iwanicki, "Lighting Technology of The Last of Us", SIGGRAPH 2013 (the equations), and Sloan and Silvennoinen,
-//! "Directional Lightmap Encoding Insights", SIGGRAPH Asia 2018; the weights and limits by the texels' errors are our own.
+//! "Directional Lightmap Encoding Insights", SIGGRAPH Asia 2018; the weights and limits by the texels' errors are our
+//! own.
 
 mod edge_grid;
 mod edges;
@@ -24,7 +26,7 @@ use crate::scene::{BakeScene, LightmapLayout};
 use crate::{BakeError, BakeOptions, BakeReport};
 use least_squares::{Patience, Unknowns};
 
-/// The maps as they are before the seams are closed.
+/// The scene and the layout of its maps, for closing seams.
 pub(crate) struct Maps<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
@@ -34,7 +36,7 @@ pub(crate) struct Maps<'a> {
     pub mean: f64,
 }
 
-/// What the maps show, per texel of all.
+/// The values of the maps, per texel of all maps.
 pub(crate) struct MapValues<'a> {
     /// Irradiance, W/m²; NaN where nothing is known.
     pub light: &'a mut [Vec3],
@@ -42,19 +44,20 @@ pub(crate) struct MapValues<'a> {
     pub variances: &'a mut [f32],
 }
 
-/// Chart of a texel that no surface covers in the open.
+/// The chart of a texel that shows no surface in the open.
 const NO_CHART: u32 = u32::MAX;
 
-/// What closing came to.
+/// The outcome of closing seams.
 struct Closed {
-    /// What was done, or why there was nothing to do.
+    /// What was done, or the reason why nothing was.
     pub report: Result<SeamReport, &'static str>,
     pub rays: u64,
-    /// What was left out, in words.
+    /// A warning if some edges were not compared with all others.
     pub warning: Option<String>,
 }
 
-/// Closes the seams of what is shown, if that is asked for, and notes in the report what came of it. A texel that is moved states by how much, too.
+/// Closes the seams of the maps, unless that is switched off, and reports the outcome. How far a texel is moved is
+/// added to its error.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -89,16 +92,16 @@ fn close(maps: &Maps<'_>, shown: MapValues<'_>, patience: Patience) -> Closed {
     for texel in maps.texels.iter().filter(|texel| !texel.is_hidden()) {
         charts[texel.index.place()] = maps.charts[texel.triangle as usize];
     }
-    let found = samples::Sampling { maps, charts: &charts, filled: shown.light, edges: &edges }.all();
-    let (rays, crowded) = (found.rays, found.crowded);
+    let seams = samples::Sampling { maps, charts: &charts, filled: shown.light, edges: &edges }.all();
+    let (rays, crowded) = (seams.rays, seams.crowded);
     let warning = (crowded > 0).then(|| {
         format!("so many borders of charts lie in one place that {crowded} of them were not compared with all others; seams may show there")
     });
-    if found.samples.is_empty() {
+    if seams.samples.is_empty() {
         return Closed { report: Err("no two borders of charts join smoothly in one place"), rays, warning };
     }
-    let unknowns = Unknowns::new(maps, &charts, &shown, &found.samples);
-    let mut report = unknowns.solve(&found.samples, shown, maps.mean, patience, &maps.scene.stop);
-    report.edges = found.pairs;
+    let unknowns = Unknowns::new(maps, &charts, &shown, &seams.samples);
+    let mut report = unknowns.solve(&seams.samples, shown, maps.mean, patience, &maps.scene.stop);
+    report.edges = seams.pairs;
     Closed { report: Ok(report), rays, warning }
 }

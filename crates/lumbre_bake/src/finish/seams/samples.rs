@@ -1,5 +1,6 @@
-//! Points along seams, about two per texel: what bilinear filtering reads there on either side. Only where the surfaces
-//! join: the same place, normals that agree, each on its own side, and nothing that stands in between.
+//! Samples along seams, about two per texel: what bilinear filtering reads there on either side. Only where the
+//! surfaces join: in the same place, with normals that agree, not folded back on each other, and with nothing in
+//! between. Not how texels are moved: that is `least_squares`.
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -9,49 +10,51 @@ use super::edges::Edge;
 use super::{Maps, NO_CHART};
 use crate::texel_index::MapTexel;
 
-/// Edges nearer than this are in one place, canonical units: 64 roundings of the largest coordinate, which is below 2.
+/// Edges nearer to each other than this are in one place, canonical units: 64 roundings of the largest coordinate,
+/// which is below 2.
 const SAME_PLACE: f64 = 64.0 / (1 << 23) as f64;
-/// Cosine of 2 degrees: shading normals within it make one smooth surface. Beyond, light differs by rights.
+/// Cosine of 2 degrees: shading normals within it make one smooth surface. Beyond that, light may really differ.
 const SMOOTH: f32 = 0.999_39;
-/// Cosine of the angle between the two surfaces above which one lies folded back on the other.
+/// Cosine between the inward directions of two surfaces from which on one lies folded back on the other.
 const FOLDED: f32 = 0.5;
-/// Samples along a texel.
+/// Samples per texel of a seam.
 const PER_TEXEL: f64 = 2.0;
-/// A wall between the two sides is looked for so far from the seam, and so far above the surface, in texels.
+/// A wall between the two sides is looked for this far from the seam, and this far above the surface, in texels.
 const BESIDE: f32 = 0.25;
 const ABOVE: f32 = 0.5;
-/// Coordinates of the same map that differ by less, in texels, read the same.
+/// Coordinates on the same map that differ by less than this, in texels, read the same value.
 const SAME_READING: f32 = 1e-3;
-/// Weights below this are roundings of a border on texel centres.
+/// Filter weights below this come from rounding, where a border runs through texel centres.
 const NEGLIGIBLE: f32 = 1.0 / 1024.0;
 
-/// What filtering reads at a point.
+/// What bilinear filtering reads at a point: four texels and their weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reading {
     pub texels: [MapTexel; 4],
-    /// In [0, 1]; their sum is 1.
+    /// Each in [0, 1]; their sum is 1.
     pub weights: [f32; 4],
 }
 
-/// A point of a seam.
+/// A point of a seam, with what is read on either side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
     pub sides: [Reading; 2],
-    /// Length of seam that it stands for, canonical units.
+    /// The length of seam that it represents, canonical units.
     pub length: f64,
 }
 
-/// All that was found.
-pub(crate) struct Found {
+/// All samples of the seams, or those of one edge.
+#[derive(Default)]
+pub(crate) struct SeamSamples {
     pub samples: Vec<Sample>,
     /// Pairs of edges with at least one sample.
     pub pairs: usize,
     pub rays: u64,
-    /// Edges that were not compared with all that lie in their place.
+    /// Edges that lie in so crowded a place that they were not compared with all others there.
     pub crowded: usize,
 }
 
-/// The search.
+/// The search for samples.
 pub(crate) struct Sampling<'a> {
     pub maps: &'a Maps<'a>,
     /// Per texel of all maps.
@@ -61,31 +64,32 @@ pub(crate) struct Sampling<'a> {
 }
 
 impl Sampling<'_> {
-    pub fn all(&self) -> Found {
+    /// The samples of all seams.
+    pub fn all(&self) -> SeamSamples {
         let grid = EdgeGrid::new(self.edges, SAME_PLACE);
         let of_edge = |index: u32| {
-            let mut own = Found { samples: Vec::new(), pairs: 0, rays: 0, crowded: 0 };
-            let (near, crowded) = grid.near(index);
-            own.crowded = usize::from(crowded);
+            let mut samples = SeamSamples::default();
+            let (near, is_crowded) = grid.near(index);
+            samples.crowded = usize::from(is_crowded);
             for other in near.into_iter().take_while(|_| !self.maps.scene.stop.is_cancelled()) {
-                let before = own.samples.len();
-                own.rays += self.between(index, other, &mut own.samples);
-                own.pairs += usize::from(own.samples.len() > before);
+                let before = samples.samples.len();
+                samples.rays += self.between(index, other, &mut samples.samples);
+                samples.pairs += usize::from(samples.samples.len() > before);
             }
-            own
+            samples
         };
-        let mut all = Found { samples: Vec::new(), pairs: 0, rays: 0, crowded: 0 };
-        let found: Vec<Found> = (0..self.edges.len() as u32).into_par_iter().map(of_edge).collect();
-        for own in found {
-            all.samples.extend(own.samples);
-            all.pairs += own.pairs;
-            all.rays += own.rays;
-            all.crowded += own.crowded;
+        let by_edge: Vec<SeamSamples> = (0..self.edges.len() as u32).into_par_iter().map(of_edge).collect();
+        let mut all = SeamSamples::default();
+        for of_edge in by_edge {
+            all.samples.extend(of_edge.samples);
+            all.pairs += of_edge.pairs;
+            all.rays += of_edge.rays;
+            all.crowded += of_edge.crowded;
         }
         all
     }
 
-    /// Adds the samples of what two edges share; returns the rays cast.
+    /// Adds the samples of the part that two edges share; returns how many rays were cast.
     fn between(&self, a: u32, b: u32, samples: &mut Vec<Sample>) -> u64 {
         let (mut long, mut short) = (&self.edges[a as usize], &self.edges[b as usize]);
         if short.length() > long.length() {
@@ -96,7 +100,7 @@ impl Sampling<'_> {
         }
         let Some((begin, end)) = shared_part(long, short) else { return 0 };
         let length = (end - begin).length();
-        // Where a point of the shared part is along an edge.
+        // Position of a point of the shared part along an edge, in [0, 1].
         let along = |edge: &Edge, point: DVec3| {
             let whole = edge.ends[1] - edge.ends[0];
             ((point - edge.ends[0]).dot(whole) / whole.length_squared()).clamp(0.0, 1.0) as f32
@@ -107,38 +111,41 @@ impl Sampling<'_> {
             return 0;
         }
         let count = (f64::from(texels) * PER_TEXEL).ceil().clamp(1.0, 65536.0) as u32;
-        let side = (length / f64::from(texels)) as f32;
+        let texel_side = (length / f64::from(texels)) as f32;
         let mut rays = 0;
         for sample in 0..count {
             let point = begin.lerp(end, (f64::from(sample) + 0.5) / f64::from(count));
             let (s, t) = (along(long, point), along(short, point));
-            let [one, other] =
+            let [long_normal, short_normal] =
                 [(long, s), (short, t)].map(|(e, t)| e.normals[0].lerp(e.normals[1], t).normalize_or_zero());
-            if one.dot(other) < SMOOTH {
+            if long_normal.dot(short_normal) < SMOOTH {
                 continue;
             }
             let uv = [(long, s), (short, t)].map(|(edge, t)| edge.uv[0].lerp(edge.uv[1], t));
             let scene = self.maps.scene;
-            let [object, other] = [long, short].map(|edge| scene.triangles[edge.triangle as usize].object);
-            if object == other && (uv[0] - uv[1]).abs().max_element() < SAME_READING {
+            let objects = [long, short].map(|edge| scene.triangles[edge.triangle as usize].object);
+            if objects[0] == objects[1] && (uv[0] - uv[1]).abs().max_element() < SAME_READING {
                 continue;
             }
-            let (Some(one), Some(other)) = (self.reading(long, uv[0]), self.reading(short, uv[1])) else {
+            let (Some(long_reading), Some(short_reading)) =
+                (self.reading(long, uv[0]), self.reading(short, uv[1]))
+            else {
                 continue;
             };
             rays += 1;
             let [from, to] = [long, short].map(|edge| {
                 let normal = scene.triangles[edge.triangle as usize].normal;
-                point.as_vec3() + (edge.inward * BESIDE + normal * ABOVE) * side
+                point.as_vec3() + (edge.inward * BESIDE + normal * ABOVE) * texel_side
             });
             if !scene.blocked(from, to) {
-                samples.push(Sample { sides: [one, other], length: length / f64::from(count) });
+                let sides = [long_reading, short_reading];
+                samples.push(Sample { sides, length: length / f64::from(count) });
             }
         }
         rays
     }
 
-    /// What is read at a place of a map, if all of it is known and no other chart's.
+    /// What bilinear filtering reads at a place of a map, if all its texels are known and none is another chart's.
     fn reading(&self, edge: &Edge, uv: Vec2) -> Option<Reading> {
         let triangle = &self.maps.scene.triangles[edge.triangle as usize];
         let map = &self.maps.layout.maps[triangle.object as usize];
@@ -152,7 +159,7 @@ impl Sampling<'_> {
             let step = Vec2::new((corner % 2) as f32, (corner / 2) as f32);
             let share = (Vec2::ONE - step) * (Vec2::ONE - fraction) + step * fraction;
             let weight = share.x * share.y;
-            // `as` saturates: clamped to the border, as a sampler does.
+            // `as` saturates at 0: with the `min` below, coordinates are clamped to the border as a sampler does.
             let (x, y) = ((low.x + step.x) as u32, (low.y + step.y) as u32);
             let texel = map.texel(x.min(map.width - 1), y.min(map.height - 1));
             reading.texels[corner] = texel;
@@ -171,7 +178,7 @@ impl Sampling<'_> {
     }
 }
 
-/// The ends of what two edges share: the shorter one lies on the longer one's line.
+/// The ends of the part that two edges share; `None` if the shorter one does not lie on the longer one's line.
 fn shared_part(long: &Edge, short: &Edge) -> Option<(DVec3, DVec3)> {
     let start = long.ends[0];
     let length = long.length();
