@@ -154,6 +154,7 @@ pub(crate) mod tests {
     use glam::Vec3;
 
     use super::*;
+    use crate::denoise::kernel::Kernel;
     use crate::denoise::surface::Surface;
 
     const SIZES: [(u32, u32); 4] = [(37, 23), (5, 3), (1, 40), (90, 30)];
