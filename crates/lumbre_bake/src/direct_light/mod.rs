@@ -83,7 +83,8 @@ pub(crate) fn direct_light(
     Ok(DirectLight { texels: direct, local })
 }
 
-/// Samples the sources that are not known from a previous bake, with everything that all passes need.
+/// Samples the direct light of the texels that are not known from a previous bake, with everything that all passes
+/// need.
 struct SourceSampler<'a> {
     sources: &'a Sources<'a>,
     texels: &'a CoveredTexels<'a>,
@@ -319,8 +320,8 @@ fn replace_first(direct: &mut [Direct], texels: &[CoveredTexel], better: Vec<Dir
     }
 }
 
-/// Texels within [`REACH`] of which, themselves included, a texel saw a source partly or saw other sources than they
-/// did.
+/// Texels that have, within [`REACH`], a texel (perhaps themselves) that saw a source partly, or one that saw other
+/// sources than they did.
 fn doubtful_texels(layout: &LightmapLayout, texels: &[Texel], direct: &[Direct]) -> Vec<CoveredTexel> {
     let mut summaries: Vec<Option<VisibilitySummary>> = vec![None; layout.texels];
     for (covered, texel) in open_texels(texels) {
