@@ -1,28 +1,31 @@
-//! Preconditioned conjugate gradients (Hestenes and Stiefel, 1952; Shewchuk, "An Introduction to the Conjugate Gradient Method Without the Agonizing
-//! Pain", 1994, B3): the patches' radiosity and closed seams are solved by it. Not their systems, nor when they are solved well enough.
+//! Preconditioned conjugate gradients (Hestenes and Stiefel, 1952; Shewchuk, "An Introduction to the Conjugate Gradient
+//! Method Without the Agonizing Pain", 1994, B3), for the radiosity of patches and for seams. Their systems, and when
+//! these are solved well enough, are defined by the callers.
 
-/// A symmetric positive definite system.
+/// A symmetric positive definite system of equations.
 pub(crate) trait System {
-    /// Its product with a vector.
+    /// The product of its matrix with a vector.
     fn multiply(&self, x: &[f64]) -> Vec<f64>;
 
-    /// A residual by the inverse of something like the system: its diagonal.
+    /// The product of the preconditioner, such as the inverse of the matrix's diagonal, with a residual.
     fn precondition(&self, residual: &[f64]) -> Vec<f64>;
 
-    /// Whether one step more is wanted after so many, by the preconditioned residual and its product with the residual.
-    fn goes_on(&self, steps: usize, preconditioned: &[f64], energy: f64) -> bool;
+    /// Whether to take another step after `steps`; `energy` is the dot product of the residual and the preconditioned
+    /// residual.
+    fn should_continue(&self, steps: usize, preconditioned: &[f64], energy: f64) -> bool;
 }
 
-/// Improves `x`, whose residual that is, as long as the system goes on; the steps that were taken, and the preconditioned residual that is left.
+/// Improves the solution `x`, whose residual is given, as long as [`System::should_continue`]. Returns the number of
+/// steps and the remaining preconditioned residual.
 pub(crate) fn solve(system: &impl System, x: &mut [f64], mut residual: Vec<f64>) -> (usize, Vec<f64>) {
     let mut preconditioned = system.precondition(&residual);
     let mut direction = preconditioned.clone();
     let mut energy = dot(&residual, &preconditioned);
     let mut steps = 0;
-    while system.goes_on(steps, &preconditioned, energy) {
+    while system.should_continue(steps, &preconditioned, energy) {
         let product = system.multiply(&direction);
         let curvature = dot(&direction, &product);
-        // Not so for any system as it should be; rounding alone gets here.
+        // A positive definite system gets here by rounding only.
         if curvature.is_nan() || curvature <= 0.0 {
             break;
         }
@@ -35,8 +38,8 @@ pub(crate) fn solve(system: &impl System, x: &mut [f64], mut residual: Vec<f64>)
         let next = dot(&residual, &preconditioned);
         let ratio = next / energy;
         energy = next;
-        for (direction, own) in direction.iter_mut().zip(&preconditioned) {
-            *direction = own + ratio * *direction;
+        for (direction, gradient) in direction.iter_mut().zip(&preconditioned) {
+            *direction = gradient + ratio * *direction;
         }
         steps += 1;
     }
@@ -51,7 +54,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// The second difference with 2 + shift on its diagonal, solved for a number of steps.
+    /// The second-difference matrix with 2 + shift on its diagonal, solved for a number of steps.
     struct Chain {
         shift: f64,
         steps: usize,
@@ -67,13 +70,13 @@ mod tests {
             residual.iter().map(|r| r / (2.0 + self.shift)).collect()
         }
 
-        fn goes_on(&self, steps: usize, _: &[f64], energy: f64) -> bool {
+        fn should_continue(&self, steps: usize, _: &[f64], energy: f64) -> bool {
             steps < self.steps && energy > 0.0
         }
     }
 
     #[test]
-    fn as_many_steps_as_unknowns_are_exact() {
+    fn as_many_steps_as_unknowns_give_the_exact_solution() {
         let expected: Vec<f64> = (0..12).map(|i| f64::from(i * i) - 7.0).collect();
         let right = Chain { shift: 0.0, steps: 0 }.multiply(&expected);
         let mut x = vec![0.0; 12];
@@ -84,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_positive_definite_ends_without_nonsense() {
+    fn systems_that_are_not_positive_definite_end_with_finite_values() {
         let mut x = vec![0.0; 4];
         let (steps, _) = solve(&Chain { shift: -9.0, steps: 100 }, &mut x, vec![1.0, -2.0, 0.5, 3.0]);
         assert!(steps < 100 && x.iter().all(|x| x.is_finite()), "{steps} {x:?}");

@@ -1,42 +1,43 @@
-//! Sets that grow together: union-find with path halving (Tarjan and van Leeuwen, "Worst-case analysis of set union algorithms", 1984). A set is
-//! named by its least member, whatever order it grew in: so that whatever counts sets gives the same numbers every time. (petgraph's names them by rank.)
+//! Disjoint sets: union-find with path halving (Tarjan and van Leeuwen, "Worst-case analysis of set union algorithms",
+//! 1984). A set is represented by its least member, in whatever order sets were joined, so that results do not depend
+//! on that order. (petgraph's `UnionFind` represents sets by rank.)
 
-/// Members 0..n, each in one set.
+/// A partition of the members 0..n into sets.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DisjointSets {
     parent: Vec<u32>,
 }
 
 impl DisjointSets {
-    /// Each member alone.
+    /// Sets of one member each.
     pub fn new(count: usize) -> Self {
         Self { parent: (0..count as u32).collect() }
     }
 
-    /// One more, alone.
+    /// Adds a member in a set of its own, and returns it.
     pub fn push(&mut self) -> u32 {
         self.parent.push(self.parent.len() as u32);
         self.parent.len() as u32 - 1
     }
 
-    /// The least member of the set.
+    /// The least member of a member's set.
     pub fn find(&mut self, mut member: u32) -> u32 {
         while self.parent[member as usize] != member {
-            let above = self.parent[self.parent[member as usize] as usize];
-            self.parent[member as usize] = above;
-            member = above;
+            let grandparent = self.parent[self.parent[member as usize] as usize];
+            self.parent[member as usize] = grandparent;
+            member = grandparent;
         }
         member
     }
 
-    /// Makes two sets one; its least member.
+    /// Joins the sets of two members, and returns the least member of the result.
     pub fn join(&mut self, a: u32, b: u32) -> u32 {
         let (a, b) = (self.find(a), self.find(b));
         self.parent[a.max(b) as usize] = a.min(b);
         a.min(b)
     }
 
-    /// Every member's set.
+    /// The least member of every member's set.
     pub fn into_sets(mut self) -> Vec<u32> {
         (0..self.parent.len() as u32).map(|member| self.find(member)).collect()
     }
@@ -47,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_set_is_named_by_its_least_member_in_any_order() {
+    fn a_set_is_represented_by_its_least_member_in_any_order() {
         let pairs = [(7, 3), (3, 9), (2, 4), (9, 8), (5, 5)];
         for forward in [true, false] {
             let mut sets = DisjointSets::new(9);

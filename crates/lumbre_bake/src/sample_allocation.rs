@@ -1,32 +1,36 @@
-//! Which texels are worth how many more rays. Not the rays.
+//! Decides how many more samples each texel gets. The samples themselves are taken by the caller.
 //!
-//! A texel whose variance is v after n samples has v (n / m)^p after m, with the order p of the sequence's convergence: a sample more takes
-//! p v / n off the sum over all, at first. The least samples for a sum come where that is the same for all that have more than at first
-//! (Neyman, "On the Two Different Aspects of the Representative Method", 1934, section 5).
+//! A texel whose variance is v after n samples has the variance v (n / m)^p after m, with the order p of the sequence's
+//! convergence: the first additional sample lowers the sum over all texels by p v / n. A given sum takes the fewest
+//! samples if this gain is the same for all texels that get more samples (Neyman allocation: Neyman, "On the Two
+//! Different Aspects of the Representative Method", 1934, section 5).
 
 use rayon::prelude::*;
 
 use crate::texel_index::CoveredTexel;
 
-/// A texel that is to have more samples.
+/// The samples that a texel is to have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SampleAllocation {
     pub texel: CoveredTexel,
-    /// In all, with those that it has.
+    /// In total, including those that it has.
     pub samples: u32,
 }
 
-/// Texels that are summed up together.
+/// Texels that are summed up in one task.
 const CHUNK: usize = 4096;
-/// Most that one round doubles the samples: a variance from few is not to be trusted further.
+/// The most times that one round doubles a texel's samples: a variance from few samples cannot be trusted further.
 const MAX_DOUBLINGS: usize = 3;
-/// What a sample must at least be worth is sought by this factor, down to this share of the highest, and then by so many halvings.
+/// The factor by which the search for the least worth of a sample goes down from the highest worth.
 const FACTOR: f64 = 4.0;
+/// The lowest value that is searched, as a share of the highest.
 const LEAST: f64 = 1e-9;
-const HALVINGS: u32 = 6;
+/// Bisections of the interval in which the search ends.
+const BISECTIONS: u32 = 6;
 
-/// The samples that bring the sum of variances down to `goal`, each texel's to at most `most`, by powers of two; all that can be had if that
-/// does not suffice. `variances` and `samples` are those of the covered texels; `order` is that of the variance's fall with the samples.
+/// Allocates the samples that bring the sum of variances of `texels` down to `goal`. Each texel's samples are doubled a
+/// few times, up to `most`; if that does not suffice, every texel gets as many as it may. `variances` and `samples` are
+/// lists of the covered texels; the variance falls with the `order`th power of the samples.
 pub(crate) fn allocate(
     texels: impl Iterator<Item = CoveredTexel> + Clone,
     variances: &[f32],
@@ -35,17 +39,17 @@ pub(crate) fn allocate(
     order: f64,
     goal: f64,
 ) -> Vec<SampleAllocation> {
-    // With k times the samples, each is worth 1 / k^(1 + p) of what it was, and k^-p of the variance is left.
+    // With k times the samples, a sample is worth k^-(1 + p) of what it was, and k^-p of the variance is left.
     let powers = |exponent: f64| [1.0, 2.0, 4.0, 8.0].map(|factor: f64| factor.powf(exponent));
     let (devalued, remaining) = (powers(1.0 + order), powers(-order));
     let worth =
         |texel: CoveredTexel| f64::from(variances[texel.place()]) / f64::from(samples[texel.place()].max(1));
-    // Doublings of a texel's samples; the last one may end at `most`.
+    // How many times a texel's samples are doubled; the last time, perhaps only up to `most`.
     let doublings = |texel: CoveredTexel, least_worth: f64| {
-        let (own, worth) = (samples[texel.place()].max(1), worth(texel));
+        let (current, worth) = (samples[texel.place()].max(1), worth(texel));
         let mut doublings = 0;
         while doublings < MAX_DOUBLINGS
-            && own << doublings < most
+            && current << doublings < most
             && worth > least_worth * devalued[doublings]
         {
             doublings += 1;
@@ -54,26 +58,28 @@ pub(crate) fn allocate(
     };
     let all: Vec<CoveredTexel> = texels.clone().collect();
     let left = |least_worth: f64| -> f64 {
-        let one = |&texel: &CoveredTexel| {
+        let variance_left = |&texel: &CoveredTexel| {
             f64::from(variances[texel.place()]) * remaining[doublings(texel, least_worth)]
         };
-        // By chunks of one size, so that the sum is the same on any number of threads.
-        let sums: Vec<f64> = all.par_chunks(CHUNK).map(|chunk| chunk.iter().map(one).sum()).collect();
+        // Chunks of a fixed size make the sum the same on any number of threads.
+        let sums: Vec<f64> =
+            all.par_chunks(CHUNK).map(|chunk| chunk.iter().map(variance_left).sum()).collect();
         sums.iter().sum()
     };
     let highest = texels.clone().map(worth).fold(0.0, f64::max);
-    // All that can be had, if need be; less where that does.
+    // A least worth of 0 gives every texel all that it may have; a higher one suffices if it meets the goal.
     let (mut too_high, mut least_worth) = (0.0, highest);
     if left(highest) > goal {
         least_worth = 0.0;
-        let mut power = highest;
-        // Down by factors first, as variances are many orders apart, to where the goal is met or nobody can have more.
-        while power > f64::MIN_POSITIVE && left(power) > goal && power > highest * LEAST {
-            (too_high, power) = (power, power / FACTOR);
+        let mut tried = highest;
+        // Variances differ by many orders of magnitude: go down by a factor until the goal is met or no texel can have
+        // more.
+        while tried > f64::MIN_POSITIVE && left(tried) > goal && tried > highest * LEAST {
+            (too_high, tried) = (tried, tried / FACTOR);
         }
-        if left(power) <= goal {
-            let (mut above, mut below) = (too_high, power);
-            for _ in 0..HALVINGS {
+        if left(tried) <= goal {
+            let (mut above, mut below) = (too_high, tried);
+            for _ in 0..BISECTIONS {
                 let middle = 0.5 * (above + below);
                 if left(middle) <= goal { below = middle } else { above = middle }
             }
@@ -81,14 +87,15 @@ pub(crate) fn allocate(
         }
     }
     let wanted = |texel: CoveredTexel| {
-        let own = samples[texel.place()].max(1);
-        (own << doublings(texel, least_worth)).min(most.max(own))
+        let current = samples[texel.place()].max(1);
+        (current << doublings(texel, least_worth)).min(most.max(current))
     };
-    let more = |texel: CoveredTexel| SampleAllocation { texel, samples: wanted(texel) };
-    texels.map(more).filter(|own| own.samples > samples[own.texel.place()]).collect()
+    let allocations = texels.map(|texel| SampleAllocation { texel, samples: wanted(texel) });
+    allocations.filter(|allocation| allocation.samples > samples[allocation.texel.place()]).collect()
 }
 
-/// As [`allocate`], of at most `budget` more samples: what is left over the goal is then as little as they can make it.
+/// Like [`allocate`], but with at most `budget` additional samples in total: if they do not suffice, the goal is raised
+/// step by step until they do.
 pub(crate) fn allocate_within(
     budget: u64,
     texels: impl Iterator<Item = CoveredTexel> + Clone,
@@ -101,7 +108,8 @@ pub(crate) fn allocate_within(
     let left: f64 = texels.clone().map(|texel| f64::from(variances[texel.place()])).sum();
     loop {
         let wanted = allocate(texels.clone(), variances, samples, most, order, goal);
-        let more = |own: &SampleAllocation| u64::from(own.samples - samples[own.texel.place()]);
+        let more =
+            |allocation: &SampleAllocation| u64::from(allocation.samples - samples[allocation.texel.place()]);
         if wanted.iter().map(more).sum::<u64>() <= budget {
             return wanted;
         }
@@ -112,7 +120,7 @@ pub(crate) fn allocate_within(
     }
 }
 
-/// By how much a goal is raised that takes too many samples.
+/// The factor by which a goal is raised that takes too many samples.
 const RELAXED: f64 = 1.2;
 
 #[cfg(test)]
@@ -124,7 +132,8 @@ mod tests {
         let variances = [16.0f32, 1.0, 0.01, 0.0];
         let samples = [4, 4, 4, 4];
         let allocated = allocate(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0);
-        // 16 to 4 brings 17.01 down to 5.01; the second's samples are worth a sixteenth of the first's.
+        // The first texel's variance falls from 16 to 4, and the sum from 17.01 to 5.01; the second's samples are worth
+        // a sixteenth of the first's.
         assert_eq!(allocated, [SampleAllocation { texel: CoveredTexel(0), samples: 16 }]);
         let total: f32 = variances.iter().sum();
         assert!(
@@ -137,7 +146,7 @@ mod tests {
     fn a_budget_goes_where_samples_are_worth_most() {
         let variances = [16.0f32, 1.0, 0.01, 0.0];
         let samples = [4, 4, 4, 4];
-        // The goal alone would take far more than these.
+        // The goal alone would take far more than 12 samples.
         let allocated = allocate_within(12, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 1e-3);
         assert_eq!(allocated, [SampleAllocation { texel: CoveredTexel(0), samples: 16 }]);
         assert!(allocate_within(3, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 1e-3).is_empty());

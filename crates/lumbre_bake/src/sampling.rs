@@ -1,5 +1,5 @@
 //! Sample points and directions: Owen-scrambled Sobol sequences (Burley, "Practical Hash-based Owen Scrambling", JCGT
-//! 9(4), 2020) and their maps to hemispheres and triangles. Not what is sampled with them.
+//! 9(4), 2020) and their mappings to hemispheres, spheres and triangles. What is sampled with them is up to the caller.
 
 use std::f32::consts::TAU;
 use std::sync::LazyLock;
@@ -7,33 +7,37 @@ use std::sync::LazyLock;
 use glam::Vec3;
 use sobol_burley::parts::{self, Int4, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
 
-/// What samples are drawn for: each has scrambles of its own, so that no two stages sample alike. Where something is sampled several times, which
-/// of them.
+/// The purpose that samples are drawn for. Each has its own scramble, so that no two stages use the same samples.
+/// Variants with a number tell apart several estimates of the same thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stream {
     /// Cosine rays of a patch.
     FormFactors,
-    /// Where on a texel it is asked whether it is hidden, and what is seen from there.
+    /// Rays that probe a texel for hidden parts.
     HiddenTexel,
+    /// Rays that classify the points of a texel as hidden or open.
     HiddenView,
-    /// Shadow rays of a texel to sources that have samples of their own.
+    /// Shadow rays of a texel to individually sampled sources.
     DirectLight,
-    /// Shadow rays of a patch, in two halves.
+    /// Shadow rays of a patch, by half.
     PatchLight(u32),
-    /// Lines through the whole scene, in two halves.
+    /// Lines through the whole scene, by half.
     GlobalLines(u32),
     /// Rays of the final gather, by replicate.
     Gather(u32),
-    /// Where the map's resolution is judged, and the light there.
+    /// Points at which the map's resolution is tested.
     ResolutionPoints,
+    /// Rays that measure the light at those points.
     ResolutionLight,
-    /// Rays of a probe, by replicate; and those of its sides to emissive faces.
+    /// Rays of a probe, by replicate.
     ProbeSphere(u32),
+    /// Shadow rays of a probe to emissive faces, by the side of its ambient cube.
     ProbeSide(u32),
-    /// What may have changed since a former bake, of patches and of blocks of texels.
+    /// Rays of patches that estimate what has changed since a previous bake.
     ChangedPatches,
+    /// The same for blocks of texels.
     ChangedTexels,
-    /// Walks that find the light around.
+    /// Walks that estimate local light.
     LocalLight,
     /// Shadow rays to sources that share samples, by replicate.
     SharedLight(u32),
@@ -42,7 +46,7 @@ pub(crate) enum Stream {
 }
 
 impl Stream {
-    /// The number that scrambles are made from, one for each stream.
+    /// A number that is different for each stream, from which its scramble is made.
     pub fn number(self) -> u32 {
         match self {
             Self::FormFactors => 1,
@@ -66,32 +70,32 @@ impl Stream {
     }
 }
 
-/// A sequence of 4D points in [0, 1)⁴, of its own scramble.
+/// A sequence of points in [0, 1)⁴ with its own scramble.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sequence {
     seed: u32,
 }
 
-/// The crate's limit of one sequence; further points are those of another scramble.
+/// The longest sequence that `sobol_burley` supports; points beyond come from another scramble.
 const LENGTH: u32 = 1 << 16;
 
 impl Sequence {
-    /// One scramble for every (seed, what it is for, which one).
+    /// The sequence for a seed, a stream and an index within the stream, such as a texel's.
     pub fn new(seed: u32, stream: Stream, index: u32) -> Self {
         Self { seed: hash(hash(hash(seed) ^ stream.number().wrapping_mul(0x9e37_79b9)) ^ index) }
     }
 
-    /// Another scramble for each `which`.
+    /// A sequence with another scramble for each `which`.
     pub fn of(&self, which: u32) -> Self {
         Self { seed: hash(self.seed ^ which.wrapping_mul(0x85eb_ca6b)) }
     }
 
-    /// The four dimensions of point `index`, of dimension set `set` (0, 1, …).
+    /// The four dimensions of point `index` in dimension set `set` (0, 1, …).
     pub fn point(&self, index: u32, set: u32) -> [f32; 4] {
         self.set(set).point(index)
     }
 
-    /// One dimension set, for several points.
+    /// One dimension set, to take several points from.
     pub fn set(&self, set: u32) -> SequenceSet {
         SequenceSet { sequence: *self, set, scramble: Scramble::new(set, self.seed) }
     }
@@ -116,7 +120,7 @@ impl SequenceSet {
     }
 }
 
-/// What `sobol_burley::sample_4d` hashes for every point, once.
+/// The hashes that `sobol_burley::sample_4d` computes anew for every point.
 #[derive(Clone, Copy)]
 struct Scramble {
     shuffle: u32,
@@ -125,20 +129,22 @@ struct Scramble {
 
 impl Scramble {
     fn new(set: u32, seed: u32) -> Self {
-        let own = seed.wrapping_mul(0x9c8f_2d3b) ^ set;
-        let dimensions = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8].map(|other| own ^ other);
+        let set_seed = seed.wrapping_mul(0x9c8f_2d3b) ^ set;
+        let dimensions =
+            [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8].map(|constant| set_seed ^ constant);
         Self { shuffle: parts::hash(seed ^ 0x79c6_8e4a), dimensions: hash_int4(dimensions.into()) }
     }
 
-    /// As `sobol_burley::sample_4d`, with the first sets' points looked up four bits of the index at a time.
+    /// The same point as `sobol_burley::sample_4d`, but in the first sets looked up by four bits of the index at a
+    /// time.
     fn point(&self, set: u32, index: u32) -> [f32; 4] {
         let shuffled = owen_scramble_rev(index.reverse_bits(), self.shuffle);
         let point = match NIBBLES.get(set as usize) {
             Some(nibbles) => {
-                let of = |nibble: usize| -> Int4 {
+                let look_up = |nibble: usize| -> Int4 {
                     nibbles[nibble][(shuffled >> (28 - 4 * nibble) & 15) as usize].into()
                 };
-                of(0) ^ of(1) ^ of(2) ^ of(3)
+                look_up(0) ^ look_up(1) ^ look_up(2) ^ look_up(3)
             }
             None => sobol_int4_rev(shuffled, set),
         };
@@ -149,7 +155,8 @@ impl Scramble {
 /// Dimension sets with a table.
 const SETS: usize = 8;
 
-/// Of each dimension set, what each value of each four bits of a reversed index, the highest first, adds to a point.
+/// For each dimension set, each group of four bits of a reversed index (the highest first) and each value of that
+/// group: its contribution to a point.
 static NIBBLES: LazyLock<[[[[u32; 4]; 16]; 4]; SETS]> = LazyLock::new(|| {
     std::array::from_fn(|set| {
         std::array::from_fn(|nibble| {
@@ -160,7 +167,7 @@ static NIBBLES: LazyLock<[[[[u32; 4]; 16]; 4]; SETS]> = LazyLock::new(|| {
     })
 });
 
-/// A 32-bit finalizer (Wellons' lowbias32).
+/// A 32-bit hash (Wellons' lowbias32).
 pub(crate) fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
@@ -175,16 +182,16 @@ pub(crate) fn cosine_direction(u: f32, v: f32) -> Vec3 {
     if a == 0.0 && b == 0.0 {
         return Vec3::Z;
     }
-    let wide = a.abs() > b.abs();
-    let (radius, other) = if wide { (a, b) } else { (b, a) };
-    let (sine, cosine) = eighth_turn(TAU / 8.0 * (other / radius));
-    let (x, y) = if wide { (cosine, sine) } else { (sine, cosine) };
+    let is_wide = a.abs() > b.abs();
+    let (radius, other) = if is_wide { (a, b) } else { (b, a) };
+    let (sine, cosine) = sin_cos_small(TAU / 8.0 * (other / radius));
+    let (x, y) = if is_wide { (cosine, sine) } else { (sine, cosine) };
     Vec3::new(radius * x, radius * y, (1.0 - radius * radius).max(0.0).sqrt())
 }
 
-/// Sine and cosine of an angle of at most an eighth of a turn, to 1e-7; the same on every machine, unlike the standard library's (Moshier, Cephes
-/// Mathematical Library, sinf.c, 1992).
-fn eighth_turn(x: f32) -> (f32, f32) {
+/// The sine and cosine of an angle of at most π / 4, to 1e-7. They have the same bits on every machine, unlike the
+/// standard library's (Moshier, Cephes Mathematical Library, sinf.c, 1992).
+fn sin_cos_small(x: f32) -> (f32, f32) {
     let y = x * x;
     let sine = ((-1.951_529_6e-4 * y + 8.332_161e-3) * y - 1.666_665_5e-1) * y * x + x;
     let cosine = ((2.443_315_7e-5 * y - 1.388_731_6e-3) * y + 4.166_664_6e-2) * y * y - 0.5 * y + 1.0;
@@ -211,15 +218,16 @@ pub(crate) fn sphere_direction(u: f32, v: f32) -> Vec3 {
     Vec3::new(radius * cosine, radius * sine, z)
 }
 
-/// A direction with density cos θ / π about a unit `normal`.
+/// A unit vector about a unit `normal` with density cos θ / π.
 pub(crate) fn cosine_about(normal: Vec3, u: f32, v: f32) -> Vec3 {
     let [x, y] = frame(normal);
     let local = cosine_direction(u, v);
     (x * local.x + y * local.y + normal * local.z).normalize_or(normal)
 }
 
-/// Barycentric weights (of the second and third vertex) of a point spread evenly over a triangle. Continuous in
-/// (u, v), so that stratified points stay stratified (Heitz, "A Low-Distortion Map Between Triangle and Square", 2019).
+/// Barycentric weights (of the second and third vertex) of a uniformly distributed point on a triangle. The map is
+/// continuous in (u, v), so that stratified points stay stratified (Heitz, "A Low-Distortion Map Between Triangle and
+/// Square", 2019).
 pub(crate) fn triangle_point(u: f32, v: f32) -> (f32, f32) {
     if v > u {
         let x = 0.5 * u;
@@ -263,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_those_of_the_crate() {
+    fn points_equal_those_of_sobol_burley() {
         for (seed, set) in [(0, 0), (7, 1), (u32::MAX, 7), (0x1234_5678, 8), (9, 60)] {
             for index in (0..LENGTH).step_by(7) {
                 let expected = sobol_burley::sample_4d(index, set, seed);
@@ -290,10 +298,10 @@ mod tests {
     }
 
     #[test]
-    fn an_eighth_of_a_turn_is_that_of_the_library() {
+    fn sine_and_cosine_agree_with_the_standard_library() {
         for step in -1000..=1000i16 {
             let x = f64::from(step) / 1000.0 * std::f64::consts::FRAC_PI_4;
-            let (sine, cosine) = eighth_turn(x as f32);
+            let (sine, cosine) = sin_cos_small(x as f32);
             let (s, c) = f64::from(x as f32).sin_cos();
             assert!((f64::from(sine) - s).abs() < 1e-7 && (f64::from(cosine) - c).abs() < 1e-7, "{x}");
         }

@@ -1,18 +1,20 @@
-//! The two numbers of a texel, which are not each other's: its place in the row of all maps, and its place among those that show a surface.
+//! The two indices of a texel, as types that cannot be confused: its index among the texels of all maps, and its index
+//! among the covered texels, which show a surface.
 
-/// A texel of a map, by its place in the row of all maps: map by map, row by row. Lists "per texel of all maps" are in this order.
+/// The index of a texel among those of all maps, map by map and row by row. Lists "per texel of all maps" are in this
+/// order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct MapTexel(pub u32);
 
-/// A texel that shows a surface, by its place among all that do. Lists "of the covered texels" are in this order.
+/// The index of a texel among the covered texels. Lists "of the covered texels" are in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct CoveredTexel(pub u32);
 
 impl MapTexel {
-    /// None of any map.
+    /// No texel.
     pub const NONE: Self = Self(u32::MAX);
 
-    /// Of the texel at this place of a list per texel of all maps, of which there are at most 2^26.
+    /// The index for a place in a list per texel of all maps, of which there are at most 2^26.
     pub fn new(place: usize) -> Self {
         Self(place as u32)
     }
@@ -24,12 +26,12 @@ impl MapTexel {
 }
 
 impl CoveredTexel {
-    /// Of the texel at this place of a list of the covered texels, of which there are no more than texels.
+    /// The index for a place in a list of the covered texels, which are no more than all texels.
     pub fn new(place: usize) -> Self {
         Self(place as u32)
     }
 
-    /// All of so many.
+    /// The indices of `count` texels, in order.
     pub fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
         (0..count as u32).map(Self)
     }

@@ -1,4 +1,5 @@
-//! Which triangles are neighbours in the map: the charts, across which nothing is filtered or filled.
+//! The charts of the lightmaps: sets of triangles that share vertices in the map. Nothing is filtered or filled from
+//! one chart to another.
 
 use std::collections::HashMap;
 

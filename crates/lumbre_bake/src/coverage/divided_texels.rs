@@ -1,5 +1,7 @@
-//! Texels that a wall thinner than themselves crosses, with surface in the open on both sides of it: one value for both. They show that
-//! value, but do not hand it on: rays read the patches there, which end at the wall. Not texels that are hidden in part: those hold the light of the part in the open.
+//! Divided texels: a wall thinner than a texel crosses them, and surface on both sides of the wall is in the open, so
+//! that one value stands for both sides. The map shows that value, but gather rays that hit there read the patches
+//! instead, which end at the wall. Texels that are partly hidden are not divided: they hold the light of their open
+//! part.
 
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -10,26 +12,27 @@ use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::visibility::clipping::clip_segment;
 use crate::visibility::contacts::{PlaneFrame, contacts};
 
-/// Texels of a contact line below which it divides nothing.
-const SHORTEST: f64 = 0.25;
-/// Texels beside a line that do not count as beyond it.
+/// Length, in texels, below which a contact line does not divide a texel.
+const MIN_LENGTH: f64 = 0.25;
+/// Distance from a line, in texels, up to which a point counts as on the line and not beyond it.
 const MARGIN: f64 = 0.05;
 
-/// Texels that contact lines cross, by their place in the row of all maps, with the line's part in the texel's unit square; ascending.
-pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(MapTexel, [DVec2; 2])> {
+/// The texels that contact lines cross, in ascending order, each with the segment of the line in the texel's unit
+/// square.
+pub(crate) fn crossed_texels(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(MapTexel, [DVec2; 2])> {
     let mut lines: Vec<(MapTexel, [DVec2; 2])> = (0..scene.triangles.len())
         .into_par_iter()
-        .flat_map_iter(|index| divisions(scene, layout, index))
+        .flat_map_iter(|index| texels_crossed_on(scene, layout, index))
         .collect();
-    // Millions, where a mesh is as fine as its texels.
+    // Where a mesh is as fine as its texels there are millions of lines to sort.
     if scene.stop.is_cancelled() {
         return Vec::new();
     }
-    lines.par_sort_by_key(|(place, _)| *place);
+    lines.par_sort_by_key(|(texel, _)| *texel);
     lines
 }
 
-/// Of the texels that lines cross, those that they divide, in the order of the maps.
+/// Those of the crossed texels that their contact lines divide, in ascending order.
 pub(crate) fn divided_texels(
     layout: &LightmapLayout,
     texels: &[Texel],
@@ -39,47 +42,54 @@ pub(crate) fn divided_texels(
     for (place, texel) in texels.iter().enumerate() {
         covered[texel.index.place()] = Some(CoveredTexel::new(place));
     }
-    let mut found: Vec<CoveredTexel> = Vec::new();
+    let mut divided: Vec<CoveredTexel> = Vec::new();
     for &(index, line) in crossed {
         let Some(texel) = covered[index.place()] else { continue };
-        if found.last() != Some(&texel) && is_divided(&texels[texel.place()], line) {
-            found.push(texel);
+        if divided.last() != Some(&texel) && is_divided(&texels[texel.place()], line) {
+            divided.push(texel);
         }
     }
-    found
+    divided
 }
 
-/// The texels that contact lines of a triangle cross, with the lines' parts in their unit squares.
-fn divisions(scene: &BakeScene, layout: &LightmapLayout, index: usize) -> Vec<(MapTexel, [DVec2; 2])> {
+/// The texels that contact lines on a triangle cross, each with the segment of the line in the texel's unit square.
+fn texels_crossed_on(
+    scene: &BakeScene,
+    layout: &LightmapLayout,
+    index: usize,
+) -> Vec<(MapTexel, [DVec2; 2])> {
     let triangle = &scene.triangles[index];
     let map = &layout.maps[triangle.object as usize];
     let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
-    let texels = (b - a).perp_dot(c - a).abs();
-    if triangle.is_hidden_duplicate || scene.stop.is_cancelled() || !(texels.is_finite() && texels > 2.0) {
+    let doubled_area = (b - a).perp_dot(c - a).abs();
+    if triangle.is_hidden_duplicate
+        || scene.stop.is_cancelled()
+        || !(doubled_area.is_finite() && doubled_area > 2.0)
+    {
         return Vec::new();
     }
-    let side = (2.0 * f64::from(triangle.area) / texels).sqrt();
+    let side = (2.0 * f64::from(triangle.area) / doubled_area).sqrt();
     let frame = PlaneFrame::new(triangle);
     let [p, q, r] = triangle.corners.map(|corner| frame.flat(corner.as_dvec3()));
     let to_texels = DMat2::from_cols(b - a, c - a) * DMat2::from_cols(q - p, r - p).inverse();
     if !to_texels.is_finite() {
         return Vec::new();
     }
-    let mut found = Vec::new();
+    let mut crossed = Vec::new();
     for segment in contacts(scene, index as u32, &frame, side as f32) {
-        // Beyond its edges the plane is not what anything stands on.
+        // Contacts are found in the triangle's plane; beyond the triangle's edges they do not matter.
         let Some(segment) = clip_segment(&[p, q, r], segment) else { continue };
         let [start, end] = segment.map(|point| a + to_texels * (point - p));
-        // What touches with a corner only.
+        // Shorter segments come from surfaces that touch the triangle with a corner only.
         if start.distance(end) < MARGIN {
             continue;
         }
         let Some((from, to)) =
-            within(start, end, DVec2::ZERO, DVec2::new(map.width.into(), map.height.into()))
+            clip_to_box(start, end, DVec2::ZERO, DVec2::new(map.width.into(), map.height.into()))
         else {
             continue;
         };
-        // Places along the line where it goes from one texel to another.
+        // Parameters at which the line passes from one texel to the next.
         let mut stops = vec![from, to];
         for axis in 0..2 {
             let (s, e) = (start[axis], end[axis]);
@@ -93,16 +103,16 @@ fn divisions(scene: &BakeScene, layout: &LightmapLayout, index: usize) -> Vec<(M
             let (x, y) = (middle.x as u32, middle.y as u32);
             if x < map.width && y < map.height {
                 let corner = DVec2::new(x.into(), y.into());
-                let part = [pair[0], pair[1]].map(|t| start.lerp(end, t) - corner);
-                found.push((map.texel(x, y), part));
+                let segment = [pair[0], pair[1]].map(|t| start.lerp(end, t) - corner);
+                crossed.push((map.texel(x, y), segment));
             }
         }
     }
-    found
+    crossed
 }
 
-/// The part of a line's parameter, in [0, 1], within a box.
-fn within(start: DVec2, end: DVec2, low: DVec2, high: DVec2) -> Option<(f64, f64)> {
+/// The interval of a segment's parameter, in [0, 1], within a box; `None` if it is empty.
+fn clip_to_box(start: DVec2, end: DVec2, low: DVec2, high: DVec2) -> Option<(f64, f64)> {
     let (mut from, mut to) = (0.0f64, 1.0f64);
     for axis in 0..2 {
         let (s, d) = (start[axis], end[axis] - start[axis]);
@@ -119,10 +129,10 @@ fn within(start: DVec2, end: DVec2, low: DVec2, high: DVec2) -> Option<(f64, f64
     (from < to).then_some((from, to))
 }
 
-/// Whether a texel shows something on both sides of a line through it.
+/// Whether a texel shows some surface on both sides of a line through it.
 fn is_divided(texel: &Texel, [from, to]: [DVec2; 2]) -> bool {
     let along = to - from;
-    if along.length() < SHORTEST {
+    if along.length() < MIN_LENGTH {
         return false;
     }
     let normal = along.normalize().perp();
@@ -148,8 +158,8 @@ mod tests {
     use crate::scene::{PlacedPrimitive, SceneObject, StaticScene};
     use crate::{BakeOptions, Density};
 
-    /// How many texels are crossed in a scene of meshes at their places.
-    fn crossed_texels(meshes: Vec<(TriangleMesh, DVec3)>) -> usize {
+    /// How many texels contact lines cross in a scene of meshes at these positions.
+    fn count_crossed(meshes: Vec<(TriangleMesh, DVec3)>) -> usize {
         let object = |(mesh, place): (TriangleMesh, DVec3)| {
             let transform = DAffine3::from_translation(place);
             let mesh = Arc::new(mesh);
@@ -160,21 +170,22 @@ mod tests {
         let options = BakeOptions { density: Density::TexelsPerMeter(8.0), ..BakeOptions::default() };
         let (layout, scene) = laid_out(&input.objects, input.space(), &options);
         let mut texels: Vec<MapTexel> =
-            crossed(&scene, &layout).into_iter().map(|(texel, _)| texel).collect();
+            super::crossed_texels(&scene, &layout).into_iter().map(|(texel, _)| texel).collect();
         texels.dedup();
         texels.len()
     }
 
     #[test]
-    fn folds_of_one_surface_cross_nothing_and_what_stands_on_it_does() {
-        // A room seen from inside: every corner of it is an edge that two of its triangles share.
+    fn only_objects_that_stand_on_a_surface_cross_its_texels() {
+        // A room seen from inside: its triangles meet only along edges that they share.
         let mut room = shapes::cuboid(Vec3::new(4.0, 3.0, 4.0), 4);
         room.indices.chunks_exact_mut(3).for_each(|corners| corners.swap(1, 2));
         room.normals.iter_mut().for_each(|normal| *normal = -*normal);
-        assert_eq!(crossed_texels(vec![(room.clone(), DVec3::ZERO)]), 0);
-        // A block of 1 m stands on its floor: 4 m of outline there and 4 m along the feet of its sides cross some 8 texels a metre.
+        assert_eq!(count_crossed(vec![(room.clone(), DVec3::ZERO)]), 0);
+        // A block of 1 m stands on its floor: the 4 m outline on the floor, and the 4 m along the bottoms of its sides,
+        // each cross about 8 texels per metre.
         let block = shapes::cuboid(Vec3::ONE, 1);
-        let standing = crossed_texels(vec![(room, DVec3::ZERO), (block, DVec3::new(0.3, -1.0, 0.4))]);
-        assert!((56..90).contains(&standing), "{standing}");
+        let crossed = count_crossed(vec![(room, DVec3::ZERO), (block, DVec3::new(0.3, -1.0, 0.4))]);
+        assert!((56..90).contains(&crossed), "{crossed}");
     }
 }

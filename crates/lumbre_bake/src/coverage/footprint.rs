@@ -1,5 +1,5 @@
-//! What each texel shows of the scene: the pieces of triangles inside its square, conservatively. Points stay on their own
-//! triangle. Not whether they are hidden inside other geometry: that is `hidden`.
+//! The footprint of each texel: the pieces of triangles that lie in its square, found by conservative rasterisation, so
+//! that a texel that a triangle merely touches is covered too. Which of it other geometry hides is found in `hidden`.
 
 use glam::Vec2;
 use rayon::prelude::*;
@@ -7,26 +7,26 @@ use rayon::prelude::*;
 use crate::scene::Receiver;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
-use crate::texel_index::MapTexel;
+use crate::texel_index::{CoveredTexel, MapTexel};
 
-/// A point of a triangle, seen by a texel.
+/// A point on a triangle that a texel shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FootprintPoint {
     pub triangle: u32,
     /// Barycentric weights of the second and third vertex.
     pub at: (f32, f32),
-    /// In the texel's unit square.
+    /// Its position in the texel's unit square.
     pub offset: Vec2,
 }
 
-/// What a texel shows.
+/// The part of the scene that a texel shows.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Footprint {
-    /// All of its square lies on one triangle.
+    /// The whole square lies on one triangle, by index.
     Whole(u32),
     /// Evenly spread points, at least one.
     Points(Vec<FootprintPoint>),
-    /// Only what other geometry hides.
+    /// Other geometry hides everything that the texel covers.
     Hidden,
 }
 
@@ -38,18 +38,19 @@ pub(crate) struct Texel {
     /// Column and row in its map.
     pub x: u32,
     pub y: u32,
-    /// One of its triangles.
+    /// One of the triangles in its footprint.
     pub triangle: u32,
     pub footprint: Footprint,
 }
 
-/// Points along a side of a texel that several triangles share, and of one that geometry hides in part.
+/// Grid points along a texel's side: for a texel that several triangles share.
 const COARSE: u32 = 4;
+/// The same for a texel that other geometry may hide in part.
 pub(crate) const FINE: u32 = 8;
-/// Points of a texel that several triangles fill.
+/// Points in the coarse grid: as many as a texel has that several triangles fill together.
 pub(crate) const GRID: usize = (COARSE * COARSE) as usize;
 
-/// The covered texels of all maps, map by map, row by row.
+/// The covered texels of all maps, map by map and row by row.
 pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texel> {
     let mut by_object: Vec<Vec<u32>> = vec![Vec::new(); layout.maps.len()];
     for (index, triangle) in scene.triangles.iter().enumerate() {
@@ -93,7 +94,9 @@ pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texe
     maps.into_iter().flatten().collect()
 }
 
-/// What a texel shows of some triangles; `None` if nothing with area.
+/// The footprint of the texel at column `x` and row `y` on some triangles: points on a grid of `resolution` x
+/// `resolution`, or, at the coarse resolution, the triangle that fills the whole texel. `None` if no triangle has area
+/// there.
 pub(crate) fn footprint(
     scene: &BakeScene,
     triangles: impl Iterator<Item = u32> + Clone,
@@ -116,15 +119,15 @@ pub(crate) fn footprint(
     for cell in 0..resolution * resolution {
         let offset =
             (Vec2::new((cell % resolution) as f32, (cell / resolution) as f32) + 0.5) / resolution as f32;
-        let found = triangles.clone().find_map(|triangle| Some((triangle, inside(triangle, offset)?)));
-        if let Some((triangle, at)) = found {
+        let hit = triangles.clone().find_map(|triangle| Some((triangle, inside(triangle, offset)?)));
+        if let Some((triangle, at)) = hit {
             points.push(FootprintPoint { triangle, at, offset });
         }
     }
     if points.is_empty() {
-        // Less than a point of the grid: the middle of each piece.
+        // The pieces are too small to contain a point of the grid: take the centroid of each.
         for triangle in triangles {
-            if let Some(offset) = middle_of_piece(&scene.triangles[triangle as usize], corner)
+            if let Some(offset) = centroid_of_piece(&scene.triangles[triangle as usize], corner)
                 && let Some((u, v)) = barycentric(&scene.triangles[triangle as usize], corner + offset)
             {
                 let u = u.clamp(0.0, 1.0);
@@ -135,7 +138,7 @@ pub(crate) fn footprint(
     (!points.is_empty()).then_some(Footprint::Points(points))
 }
 
-/// Calls `visit` for texels whose square a triangle touches, and perhaps a few beside it.
+/// Calls `visit` for every texel whose square a triangle touches, and perhaps for a few next to it.
 fn covered_texels(triangle: &SceneTriangle, width: u32, height: u32, mut visit: impl FnMut(u32, u32)) {
     let [a, mut b, mut c] = triangle.uv;
     let area = (b - a).perp_dot(c - a);
@@ -148,11 +151,11 @@ fn covered_texels(triangle: &SceneTriangle, width: u32, height: u32, mut visit: 
     let edges = [(a, b - a), (b, c - b), (c, a - c)];
     let low = a.min(b).min(c).floor().max(Vec2::ZERO);
     let high = a.max(b).max(c).ceil().min(Vec2::new(width as f32, height as f32));
-    // `as` saturates: what is negative becomes 0.
+    // `as` saturates: negative numbers become 0.
     for y in low.y as u32..(high.y as u32).max(low.y as u32 + 1).min(height) {
         for x in low.x as u32..(high.x as u32).max(low.x as u32 + 1).min(width) {
             let center = Vec2::new(x as f32, y as f32) + 0.5;
-            // Half a texel's reach along each edge's normal.
+            // The square reaches this far from its center along the edge's normal.
             let outside = edges.iter().any(|(start, along)| {
                 along.perp_dot(center - *start) < -0.5 * (along.x.abs() + along.y.abs())
             });
@@ -163,7 +166,7 @@ fn covered_texels(triangle: &SceneTriangle, width: u32, height: u32, mut visit: 
     }
 }
 
-/// Barycentric weights (second, third vertex) of a texel position; `None` where the map flattens the triangle.
+/// Barycentric weights (second, third vertex) of a position in the map; `None` if the triangle has no area in the map.
 pub(crate) fn barycentric(triangle: &SceneTriangle, position: Vec2) -> Option<(f32, f32)> {
     let [a, b, c] = triangle.uv;
     let area = (b - a).perp_dot(c - a);
@@ -171,8 +174,8 @@ pub(crate) fn barycentric(triangle: &SceneTriangle, position: Vec2) -> Option<(f
     (u.is_finite() && v.is_finite()).then_some((u, v))
 }
 
-/// The centroid of the triangle's part in a texel's square, in the square; Sutherland and Hodgman's clipping.
-fn middle_of_piece(triangle: &SceneTriangle, corner: Vec2) -> Option<Vec2> {
+/// The centroid, in the texel's unit square, of the part of a triangle in that square (Sutherland-Hodgman clipping).
+fn centroid_of_piece(triangle: &SceneTriangle, corner: Vec2) -> Option<Vec2> {
     let mut polygon: Vec<Vec2> = triangle.uv.iter().map(|&uv| uv - corner).collect();
     for (axis, sign, limit) in [(0, 1.0, 0.0), (0, -1.0, -1.0), (1, 1.0, 0.0), (1, -1.0, -1.0)] {
         let height = |p: Vec2| sign * p[axis] - limit;
@@ -191,16 +194,21 @@ fn middle_of_piece(triangle: &SceneTriangle, corner: Vec2) -> Option<Vec2> {
     let &first = polygon.first()?;
     let (mut sum, mut area) = (Vec2::ZERO, 0.0);
     for pair in polygon.windows(2).skip(1) {
-        let own = (pair[0] - first).perp_dot(pair[1] - first);
-        sum += (first + pair[0] + pair[1]) / 3.0 * own;
-        area += own;
+        let doubled_area = (pair[0] - first).perp_dot(pair[1] - first);
+        sum += (first + pair[0] + pair[1]) / 3.0 * doubled_area;
+        area += doubled_area;
     }
-    let middle = sum / area;
-    middle.is_finite().then(|| middle.clamp(Vec2::ZERO, Vec2::ONE))
+    let centroid = sum / area;
+    centroid.is_finite().then(|| centroid.clamp(Vec2::ZERO, Vec2::ONE))
+}
+
+/// The texels that are not hidden, each with its index among the covered texels.
+pub(crate) fn open_texels(texels: &[Texel]) -> impl Iterator<Item = (CoveredTexel, &Texel)> {
+    CoveredTexel::all(texels.len()).zip(texels).filter(|(_, texel)| !texel.is_hidden())
 }
 
 impl Texel {
-    /// The point of the footprint at a place of the unit square.
+    /// The point of the footprint for a sample position in the unit square.
     #[inline]
     pub fn point(&self, scene: &BakeScene, x: f32, y: f32) -> Option<FootprintPoint> {
         match &self.footprint {
@@ -219,7 +227,7 @@ impl Texel {
         }
     }
 
-    /// The middle of what it shows, in its unit square.
+    /// The mean position of the footprint in the texel's unit square.
     pub fn middle(&self) -> Vec2 {
         match &self.footprint {
             Footprint::Points(points) if !points.is_empty() => {
@@ -229,20 +237,20 @@ impl Texel {
         }
     }
 
-    /// Length of its side on its surface, canonical units.
+    /// Length of the texel's side on its surface, canonical units.
     pub fn side(&self, scene: &BakeScene) -> f32 {
         let triangle = &scene.triangles[self.triangle as usize];
         let [a, b, c] = triangle.uv;
         (2.0 * triangle.area / (b - a).perp_dot(c - a).abs()).sqrt()
     }
 
-    /// Whether it shows nothing that light reaches.
+    /// Whether other geometry hides all of it.
     pub fn is_hidden(&self) -> bool {
         self.footprint == Footprint::Hidden
     }
 }
 
-/// The receiver at a point of a triangle's front.
+/// The receiver at a point on a triangle's front side.
 #[inline]
 pub(crate) fn receiver(scene: &BakeScene, point: &FootprintPoint) -> Receiver {
     let triangle = &scene.triangles[point.triangle as usize];
@@ -256,8 +264,8 @@ pub(crate) fn receiver(scene: &BakeScene, point: &FootprintPoint) -> Receiver {
     Receiver { position, origin, geometric_normal: triangle.normal, normal }
 }
 
-/// Lifts a point of a flat triangle to the curved surface that its normals tell of, so that the facets do not shade each
-/// other (Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4).
+/// Lifts a point of a flat triangle to the curved surface that its vertex normals describe, so that the facets do not
+/// shade each other (Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4).
 fn on_curved_surface(triangle: &SceneTriangle, position: glam::Vec3, u: f32, v: f32) -> glam::Vec3 {
     let weights = [1.0 - u - v, u, v];
     (0..3)

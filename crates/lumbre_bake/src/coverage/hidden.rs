@@ -1,13 +1,15 @@
-//! Texels that lie, wholly or in part, inside other geometry or pressed against it: told by rays that meet the insides of things, or
-//! meet something at once. The hidden part is taken out of the footprint, so that a texel half under a box has the light of its open half.
-//! What a texel shows belongs to the map and not to the light: it is the same for every seed, as long as there is time to look closely.
+//! Finds texels that lie, wholly or in part, inside other geometry or pressed against it: rays from there hit the
+//! inside of a solid, or hit something almost at once. The hidden part is taken out of the footprint, so that a texel
+//! half under a box has the light of its open half. The result is independent of the bake's seed, unless the time is
+//! too short to classify all texels exactly.
 
 use glam::Vec2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
-use super::tiles::{Tiles, area, positions_of};
+use super::texel_geometry::{bounding_area, positions_of};
+use super::texel_groups::TexelGroups;
 use crate::BakeError;
 use crate::chunks::in_chunks;
 use crate::monitor::{BakeMonitor, Clock};
@@ -16,30 +18,35 @@ use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::texel_index::MapTexel;
 use crate::visibility::shaft::is_free_before;
 
-/// Seed of all rays here.
+/// The seed of all rays here, independent of the bake's seed.
 const SEED: u32 = 0;
-/// A point from which no ray comes further than this share of its texel's side, or of its triangle's, lies against something: faces
-/// that touch are apart by what their corners are rounded by, and no light is seen in between.
-const PRESSED: f32 = 1.0 / 64.0;
+/// A ray that ends within this share of the texel's side, or of its triangle's, is blocked: the point lies against
+/// another surface. Faces that touch are apart by the rounding of their corners, and no light gets in between.
+const MIN_CLEARANCE: f32 = 1.0 / 64.0;
 
-/// Rays that look for something odd in every texel, and in a tile that nothing crosses, and those that judge a point of an odd one.
+/// Rays per texel that decide whether it is suspicious, so that its points are classified one by one.
 const PROBES: u32 = 6;
+/// Rays per tile whose space in front no geometry crosses.
 const TILE_PROBES: u32 = 16;
-/// Those of a texel when it has to go fast.
+/// Rays per texel once the time for exact classification is up.
 const LATE_PROBES: u32 = 2;
-const JUDGES: u32 = 8;
-/// So many of those that judge have to see something: where faces touch, one may slip out along them.
-const CLEAR: u32 = 2;
+/// Rays per point that classify it as open or hidden.
+const POINT_RAYS: u32 = 8;
+/// Rays that must be clear for an open point if another is blocked: where faces touch, a single ray may slip out
+/// between them.
+const MIN_CLEAR: u32 = 2;
 
-/// Of the time until the running stage takes no more samples, what may pass before texels are judged roughly: light wants some of it, too.
-const CLOSELY: f64 = 0.5;
-/// So many texels are looked at as closely as ever, whatever time it takes: no small map loses anything.
-const ALWAYS_CLOSELY: usize = 4096;
-/// Of the running stage's time, what it usually takes to find texels that look odd, and of the rest, to judge them.
+/// Share of the time that the running stage may use up before texels are only classified roughly: direct light needs
+/// the rest.
+const EXACT_TIME_SHARE: f64 = 0.5;
+/// The first so many texels are classified exactly whatever time it takes, so that small maps never lose quality.
+const ALWAYS_EXACT: usize = 4096;
+/// Usual share of the running stage's time that it takes to find suspicious texels, and of the time after that, to
+/// classify them.
 const PASSES: [f32; 2] = [0.1, 0.2];
 
-/// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast. Contact lines cross the
-/// texels that are `crossed`, and divide those that are `touched`.
+/// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast.
+/// Contact lines cross the texels in `crossed`, and divide those in `divided`.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -48,72 +55,69 @@ pub(crate) fn remove_hidden(
     layout: &LightmapLayout,
     texels: &mut [Texel],
     crossed: impl Iterator<Item = MapTexel>,
-    touched: &[MapTexel],
+    divided: &[MapTexel],
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(usize, u64), BakeError> {
-    let clock = monitor.clock().until(CLOSELY);
-    let (odd, mut rays) = odd(scene, texels, clock, monitor)?;
-    // Six rays may miss a corner of a texel; its neighbours' rays did not.
-    let mut near = vec![false; layout.texels];
-    touched.iter().for_each(|texel| near[texel.place()] = true);
-    let mut mixed = vec![false; layout.texels];
-    crossed.for_each(|texel| mixed[texel.place()] = true);
-    for (texel, _) in texels.iter().zip(&odd).filter(|(_, odd)| **odd) {
+    let clock = monitor.clock().until(EXACT_TIME_SHARE);
+    let (suspicious, mut rays) = suspicious_texels(scene, texels, clock, monitor)?;
+    let mut is_crossed = vec![false; layout.texels];
+    crossed.for_each(|texel| is_crossed[texel.place()] = true);
+    let mut is_suspect = vec![false; layout.texels];
+    divided.iter().for_each(|texel| is_suspect[texel.place()] = true);
+    // The few rays of a texel may miss a hidden corner that its neighbours' rays have found.
+    for (texel, _) in texels.iter().zip(&suspicious).filter(|(_, suspicious)| **suspicious) {
         let map = &layout.maps[texel.object as usize];
-        for y in texel.y.saturating_sub(1)..=(texel.y + 1).min(map.height - 1) {
-            for x in texel.x.saturating_sub(1)..=(texel.x + 1).min(map.width - 1) {
-                near[map.texel(x, y).place()] = true;
-            }
-        }
+        map.neighbourhood(texel.x, texel.y, 1).for_each(|near| is_suspect[near.place()] = true);
     }
-    let mut suspects: Vec<&mut Texel> = texels.iter_mut().filter(|texel| near[texel.index.place()]).collect();
+    let mut suspects: Vec<&mut Texel> =
+        texels.iter_mut().filter(|texel| is_suspect[texel.index.place()]).collect();
     monitor.pass(PASSES[1]);
-    let judged = in_chunks(suspects.len(), monitor, |place| {
+    let classified = in_chunks(suspects.len(), monitor, |place| {
         let texel = &*suspects[place];
-        if place >= ALWAYS_CLOSELY && clock.is_over() {
-            judge_roughly(scene, texel)
+        if place >= ALWAYS_EXACT && clock.is_over() {
+            classify_roughly(scene, texel)
         } else {
-            judge(scene, texel, mixed[texel.index.place()])
+            classify(scene, texel, is_crossed[texel.index.place()])
         }
     })?;
-    rays += judged.iter().map(|judged| u64::from(judged.rays)).sum::<u64>();
+    rays += classified.iter().map(|points| u64::from(points.rays)).sum::<u64>();
     let hidden = monitor.run_interruptible(1.0, || {
-        let pairs = suspects.par_iter_mut().zip(&judged);
-        pairs.map(|(texel, judged)| usize::from(keep_open(scene, texel, judged))).sum()
+        let pairs = suspects.par_iter_mut().zip(&classified);
+        pairs.map(|(texel, points)| usize::from(keep_open(scene, texel, points))).sum()
     })?;
     Ok((hidden, rays))
 }
 
-/// Rays that end before this go nowhere, canonical units.
-fn pressed(scene: &BakeScene, texel: &Texel) -> f32 {
-    let own = (2.0 * scene.triangles[texel.triangle as usize].area).sqrt();
-    // The smaller one, and never NaN.
-    PRESSED * own.min(texel.side(scene))
+/// Length below which a ray from a texel is blocked, canonical units.
+fn min_clearance(scene: &BakeScene, texel: &Texel) -> f32 {
+    let triangle_side = (2.0 * scene.triangles[texel.triangle as usize].area).sqrt();
+    // `min` returns the other number if one is NaN.
+    MIN_CLEARANCE * triangle_side.min(texel.side(scene))
 }
 
-/// Texels that look odd, and the rays cast. Where nothing crosses the space before a tile, all of it is inside of something or none of it:
-/// some rays of the whole tile tell.
-fn odd(
+/// Whether each texel is suspicious, and the rays cast. Where no geometry crosses the space in front of a tile, all of
+/// the tile is inside a solid or none of it, and a few rays for the whole tile decide.
+fn suspicious_texels(
     scene: &BakeScene,
     texels: &[Texel],
     clock: Clock,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(Vec<bool>, u64), BakeError> {
-    let tiles = Tiles::new(texels);
-    let suspect = monitor.run_interruptible(0.0, || suspect(scene, texels, &tiles))?;
-    let suspects = |place: usize| suspect[tiles.tile_of[place] as usize];
+    let tiles = TexelGroups::tiles(texels);
+    let suspicious_tiles = monitor.run_interruptible(0.0, || suspicious_tiles(scene, texels, &tiles))?;
+    let must_probe = |place: usize| suspicious_tiles[tiles.group_of[place] as usize];
     monitor.pass(PASSES[0]);
-    let odd = in_chunks(texels.len(), monitor, |place| {
-        let probes = if place >= ALWAYS_CLOSELY && clock.is_over() { LATE_PROBES } else { PROBES };
-        suspects(place) && looks_odd(scene, &texels[place], probes)
+    let suspicious = in_chunks(texels.len(), monitor, |place| {
+        let probes = if place >= ALWAYS_EXACT && clock.is_over() { LATE_PROBES } else { PROBES };
+        must_probe(place) && is_suspicious(scene, &texels[place], probes)
     })?;
-    let asked = (0..texels.len()).filter(|&place| suspects(place)).count();
-    let rays = tiles.members.len() as u64 * u64::from(TILE_PROBES) + asked as u64 * u64::from(PROBES);
-    Ok((odd, rays))
+    let probed = (0..texels.len()).filter(|&place| must_probe(place)).count();
+    let rays = tiles.members.len() as u64 * u64::from(TILE_PROBES) + probed as u64 * u64::from(PROBES);
+    Ok((suspicious, rays))
 }
 
-/// Of each tile, whether its texels have to be looked at one by one.
-fn suspect(scene: &BakeScene, texels: &[Texel], tiles: &Tiles) -> Vec<bool> {
+/// Whether the texels of each tile have to be probed one by one.
+fn suspicious_tiles(scene: &BakeScene, texels: &[Texel], tiles: &TexelGroups) -> Vec<bool> {
     tiles
         .members
         .par_iter()
@@ -124,23 +128,23 @@ fn suspect(scene: &BakeScene, texels: &[Texel], tiles: &Tiles) -> Vec<bool> {
             let members: Vec<&Texel> = members.iter().map(|&place| &texels[place as usize]).collect();
             let mut positions = Vec::new();
             members.iter().for_each(|texel| positions_of(scene, texel, &mut positions));
-            let free = members.first().and_then(|first| area(scene, first.triangle, &positions));
-            let free = free.is_some_and(|area| is_free_before(&area, scene));
-            let of_tile =
+            let area = members.first().and_then(|first| bounding_area(scene, first.triangle, &positions));
+            let is_free = area.is_some_and(|area| is_free_before(&area, scene));
+            let probed =
                 (0..TILE_PROBES).map(|ray| members[ray as usize * members.len() / TILE_PROBES as usize]);
-            let fine = |(ray, texel): (usize, &Texel)| probe(scene, texel, ray as u32) == Probe::Clear;
-            !(free && of_tile.enumerate().all(fine))
+            let is_clear = |(ray, texel): (usize, &Texel)| probe(scene, texel, ray as u32) == Probe::Clear;
+            !(is_free && probed.enumerate().all(is_clear))
         })
         .collect()
 }
 
-/// What a ray of a texel meets.
+/// The outcome of a ray from a texel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Probe {
     Clear,
-    /// Something at once.
-    Pressed,
-    /// The inside of something, or a back, or nothing where it is dark outside.
+    /// It hits a lit surface almost at once.
+    Blocked,
+    /// It hits the inside of a solid or a back face, or leaves a scene that is dark outside.
     Hidden,
 }
 
@@ -151,33 +155,34 @@ fn probe(scene: &BakeScene, texel: &Texel, ray: u32) -> Probe {
     let direction = cosine_about(receiver.geometric_normal, u, v);
     match scene.classify_hit(receiver.origin, direction) {
         SurfaceHit::Inside | SurfaceHit::Back => Probe::Hidden,
-        SurfaceHit::Lit { distance, .. } if distance < pressed(scene, texel) => Probe::Pressed,
+        SurfaceHit::Lit { distance, .. } if distance < min_clearance(scene, texel) => Probe::Blocked,
         SurfaceHit::Lit { .. } | SurfaceHit::None => Probe::Clear,
     }
 }
 
-fn looks_odd(scene: &BakeScene, texel: &Texel, probes: u32) -> bool {
-    let mut ended = 0;
+/// Whether some ray of a texel suggests that part of it is hidden.
+fn is_suspicious(scene: &BakeScene, texel: &Texel, probes: u32) -> bool {
+    let mut blocked = 0;
     (0..probes).any(|ray| match probe(scene, texel, ray) {
         Probe::Hidden => true,
-        // One may end so in any corner.
-        Probe::Pressed => {
-            ended += 1;
-            ended > 1
+        // In any corner of a room one ray may be blocked.
+        Probe::Blocked => {
+            blocked += 1;
+            blocked > 1
         }
         Probe::Clear => false,
     })
 }
 
-/// What was found out about a texel.
+/// The classification of a texel's points, and the rays that it took.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-struct Judged {
-    /// Whether each of the points of its fine footprint is in the open, bit by bit; empty where all are.
+struct OpenPoints {
+    /// One bit for each point of the texel's fine footprint, set if it is in the open; empty if all points are.
     open: Vec<u64>,
     rays: u32,
 }
 
-/// The evenly spread points of a texel that are judged, the same ones each time.
+/// The evenly spread points of a texel that are classified, always the same ones.
 fn fine_points(scene: &BakeScene, texel: &Texel) -> Option<Vec<FootprintPoint>> {
     let mut triangles: Vec<u32> = match &texel.footprint {
         Footprint::Whole(triangle) => vec![*triangle],
@@ -192,51 +197,52 @@ fn fine_points(scene: &BakeScene, texel: &Texel) -> Option<Vec<FootprintPoint>> 
     }
 }
 
-/// Which points of a texel are in the open. Between contact lines a surface is hidden or is not: in a texel that is not `mixed`, having none,
-/// the corners and the middle tell for all, if they agree.
-fn judge(scene: &BakeScene, texel: &Texel, mixed: bool) -> Judged {
-    let Some(points) = fine_points(scene, texel) else { return Judged::default() };
+/// Classifies the points of a texel. Between contact lines a surface is either hidden or open throughout, so where none
+/// crosses the texel, and its corners and middle agree, they decide for all points.
+fn classify(scene: &BakeScene, texel: &Texel, is_crossed: bool) -> OpenPoints {
+    let Some(points) = fine_points(scene, texel) else { return OpenPoints::default() };
     let sequence = Sequence::new(SEED, Stream::HiddenView, texel.index.0);
-    let pressed = pressed(scene, texel);
+    let clearance = min_clearance(scene, texel);
     let mut rays = 0;
     let mut is_open = |index: usize| {
-        let (is_open, cast) = in_the_open(scene, &points[index], sequence, index as u32, pressed);
+        let (is_open, cast) = is_point_open(scene, &points[index], sequence, index as u32, clearance);
         rays += cast;
         is_open
     };
-    let telling = if mixed { Vec::new() } else { corners_and_middle(&points) };
-    let told: Vec<bool> = telling.into_iter().map(&mut is_open).collect();
-    let agreed = told.first().copied().filter(|first| told.iter().all(|told| told == first));
+    let key_points = if is_crossed { Vec::new() } else { corners_and_middle(&points) };
+    let key_results: Vec<bool> = key_points.into_iter().map(&mut is_open).collect();
+    let agreed =
+        key_results.first().copied().filter(|first| key_results.iter().all(|result| result == first));
     let mut open = vec![0u64; points.len().div_ceil(64)];
-    let mut all = true;
+    let mut all_open = true;
     for index in 0..points.len() {
         if agreed.unwrap_or_else(|| is_open(index)) {
             open[index / 64] |= 1 << (index % 64);
         } else {
-            all = false;
+            all_open = false;
         }
     }
-    if all {
+    if all_open {
         open.clear();
     }
-    Judged { open, rays }
+    OpenPoints { open, rays }
 }
 
-/// All of a texel or nothing of it, by what most of the rays meet that look for something odd.
-fn judge_roughly(scene: &BakeScene, texel: &Texel) -> Judged {
+/// Classifies all points of a texel alike: as open if at least half of its probe rays are clear.
+fn classify_roughly(scene: &BakeScene, texel: &Texel) -> OpenPoints {
     let clear = (0..PROBES).filter(|&ray| probe(scene, texel, ray) == Probe::Clear).count();
     let open = if 2 * clear >= PROBES as usize { Vec::new() } else { vec![0] };
-    Judged { open, rays: PROBES }
+    OpenPoints { open, rays: PROBES }
 }
 
-/// Keeps the points of a texel that are in the open; whether it has lost some.
-fn keep_open(scene: &BakeScene, texel: &mut Texel, judged: &Judged) -> bool {
-    if judged.open.is_empty() {
+/// Keeps only the open points of a texel; returns whether it has lost some.
+fn keep_open(scene: &BakeScene, texel: &mut Texel, classified: &OpenPoints) -> bool {
+    if classified.open.is_empty() {
         return false;
     }
     let Some(points) = fine_points(scene, texel) else { return false };
     let is_open =
-        |index: usize| judged.open.get(index / 64).is_some_and(|bits| bits >> (index % 64) & 1 == 1);
+        |index: usize| classified.open.get(index / 64).is_some_and(|bits| bits >> (index % 64) & 1 == 1);
     let open: Vec<FootprintPoint> =
         points.iter().enumerate().filter(|(index, _)| is_open(*index)).map(|(_, point)| *point).collect();
     if open.is_empty() {
@@ -248,7 +254,7 @@ fn keep_open(scene: &BakeScene, texel: &mut Texel, judged: &Judged) -> bool {
     true
 }
 
-/// The points of a footprint that are nearest to its square's corners and middle, by index.
+/// The indices of the points of a footprint that are nearest to the corners and the middle of the texel's square.
 fn corners_and_middle(points: &[FootprintPoint]) -> Vec<usize> {
     let places = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE, Vec2::splat(0.5)];
     let nearest = |place: Vec2| {
@@ -258,34 +264,35 @@ fn corners_and_middle(points: &[FootprintPoint]) -> Vec<usize> {
     places.into_iter().filter_map(nearest).collect()
 }
 
-/// Half the rays see the inside of something closed, or all see backs or end at once, or all but one where some end at once: the point is
-/// hidden. With it come the rays cast: fewer where the others cannot change that.
-fn in_the_open(
+/// Whether a point is in the open, and the rays cast: fewer than [`POINT_RAYS`] where the first ones decide. The point
+/// is hidden if half of its rays hit the inside of a solid, or if too few are clear: none, or fewer than [`MIN_CLEAR`]
+/// where some are blocked.
+fn is_point_open(
     scene: &BakeScene,
     point: &FootprintPoint,
     sequence: Sequence,
     index: u32,
-    at_once: f32,
+    clearance: f32,
 ) -> (bool, u32) {
     let receiver = receiver(scene, point);
-    let (mut inside, mut pressed, mut clear) = (0, 0, 0);
-    for ray in 0..JUDGES {
-        let [u, v, ..] = sequence.point(index * JUDGES + ray, 0);
+    let (mut inside, mut blocked, mut clear) = (0, 0, 0);
+    for ray in 0..POINT_RAYS {
+        let [u, v, ..] = sequence.point(index * POINT_RAYS + ray, 0);
         match scene.classify_hit(receiver.origin, cosine_about(receiver.geometric_normal, u, v)) {
             SurfaceHit::Inside => inside += 1,
             SurfaceHit::Back => {}
-            SurfaceHit::Lit { distance, .. } if distance < at_once => pressed += 1,
+            SurfaceHit::Lit { distance, .. } if distance < clearance => blocked += 1,
             SurfaceHit::Lit { .. } => clear += 1,
             SurfaceHit::None => clear += 1,
         }
         let cast = ray + 1;
-        if 2 * inside >= JUDGES {
+        if 2 * inside >= POINT_RAYS {
             return (false, cast);
         }
-        let enough = if pressed > 0 { CLEAR } else { 1 };
-        if 2 * (cast - inside) > JUDGES && clear >= enough {
+        let enough = if blocked > 0 { MIN_CLEAR } else { 1 };
+        if 2 * (cast - inside) > POINT_RAYS && clear >= enough {
             return (true, cast);
         }
     }
-    (false, JUDGES)
+    (false, POINT_RAYS)
 }

@@ -1,13 +1,13 @@
-//! Sample points that the texels of a tile share: each texel takes its own run of one sequence, in Morton order, so that the
-//! points of every aligned 2 x 2, 4 x 4 and 8 x 8 block together are as evenly spread as one texel's. What smoothing then adds
-//! up has the error of one long low-discrepancy sequence, not of many short independent ones (Ahmed and Wonka,
-//! "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels", 2020).
-//! Not the points themselves: that is `sampling`.
+//! Sample points that the texels of a tile share: each texel takes its own run of one sequence, in Morton order, so
+//! that the points of every aligned 2 x 2, 4 x 4 and 8 x 8 block together are as evenly spread as those of one texel.
+//! The sums over neighbours that the denoiser takes then have the error of one long low-discrepancy sequence instead of
+//! many short independent ones (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via
+//! Hierarchical Ordering of Pixels", 2020). The sequences themselves are in `sampling`.
 
 use super::footprint::Texel;
 use crate::sampling::{Sequence, SequenceSet, Stream};
 
-/// Texels along a tile's side, and in it.
+/// Texels along a tile's side, and in a tile.
 const SIDE: u32 = 8;
 const TEXELS: u32 = SIDE * SIDE;
 
@@ -15,35 +15,36 @@ const TEXELS: u32 = SIDE * SIDE;
 #[derive(Clone, Copy)]
 pub(crate) struct TileSequence {
     sequence: Sequence,
-    /// Its first dimension set, of which every sample has a point.
+    /// Dimension set 0, prepared once because every sample uses it.
     first_set: SequenceSet,
-    /// The texel's place in its tile.
-    place: u32,
-    /// Points of a texel's first run.
+    /// The texel's position in its tile, in Morton order.
+    morton_index: u32,
+    /// Points in a texel's first run.
     run: u32,
 }
 
 impl TileSequence {
-    /// One scramble for every stream and tile; every texel takes `run` points at first, and later as many again as it has.
+    /// Every stream and tile has a scramble of its own. Each texel takes `run` points at first; each later run is as
+    /// long as all runs before it together.
     pub fn new(seed: u32, stream: Stream, texel: &Texel, run: u32) -> Self {
         // Maps are at most 8192 texels wide: 10 bits of tiles.
         let tile = ((texel.y / SIDE) << 10) | (texel.x / SIDE);
         let sequence = Sequence::new(seed, stream, tile).of(texel.object);
-        let place = morton(texel.x % SIDE, texel.y % SIDE);
-        Self { sequence, first_set: sequence.set(0), place, run: run.max(1) }
+        let morton_index = morton(texel.x % SIDE, texel.y % SIDE);
+        Self { sequence, first_set: sequence.set(0), morton_index, run: run.max(1) }
     }
 
-    /// The texel's point `sample`, of dimension set 0.
+    /// The texel's point `sample` in dimension set 0.
     pub fn first(&self, sample: u32) -> [f32; 4] {
         self.first_set.point(self.index(sample))
     }
 
-    /// The texel's point `sample`, of dimension set `set`.
+    /// The texel's point `sample` in dimension set `set`.
     pub fn point(&self, sample: u32, set: u32) -> [f32; 4] {
         self.sequence.point(self.index(sample), set)
     }
 
-    /// Runs of all texels lie one after the other; then the second runs, and so on, each as long as those before together.
+    /// The index in the tile's sequence: first come the first runs of all texels, then their second runs, and so on.
     fn index(&self, sample: u32) -> u32 {
         let mut before = 0;
         let mut run = self.run;
@@ -51,11 +52,11 @@ impl TileSequence {
             before += run;
             run = before;
         }
-        TEXELS * before + self.place * run + (sample - before)
+        TEXELS * before + self.morton_index * run + (sample - before)
     }
 }
 
-/// Bits of two numbers below 8, interleaved.
+/// The Morton code of two numbers below 8: their bits interleaved.
 fn morton(x: u32, y: u32) -> u32 {
     let spread = |v: u32| (v & 1) | ((v & 2) << 1) | ((v & 4) << 2);
     spread(x) | (spread(y) << 1)
@@ -75,9 +76,9 @@ mod tests {
     fn every_point_belongs_to_one_texel_of_a_tile() {
         let mut taken = vec![false; 64 * 32];
         for (x, y) in (0..8).flat_map(|y| (0..8).map(move |x| (x, y))) {
-            let own = TileSequence::new(0, Stream::Test(0), &texel(x, y), 8);
+            let sequence = TileSequence::new(0, Stream::Test(0), &texel(x, y), 8);
             for sample in 0..32 {
-                let index = own.index(sample) as usize;
+                let index = sequence.index(sample) as usize;
                 assert!(!std::mem::replace(&mut taken[index], true), "{x} {y} {sample}");
             }
         }
@@ -86,12 +87,12 @@ mod tests {
 
     #[test]
     fn a_block_of_texels_is_as_evenly_spread_as_one_of_them() {
-        // 4 x 4 texels with 4 points each: 64 points, one in each of 8 x 8 squares of any two of the first two dimensions.
+        // 4 x 4 texels with 4 points each make 64 points: one in each of 8 x 8 squares of the first two dimensions.
         let mut cells = [0u32; 64];
         for (x, y) in (0..4).flat_map(|y| (0..4).map(move |x| (x + 4, y))) {
-            let own = TileSequence::new(5, Stream::Test(1), &texel(x, y), 4);
+            let sequence = TileSequence::new(5, Stream::Test(1), &texel(x, y), 4);
             for sample in 0..4 {
-                let [u, v, ..] = own.first(sample);
+                let [u, v, ..] = sequence.first(sample);
                 cells[(u * 8.0) as usize + 8 * (v * 8.0) as usize] += 1;
             }
         }

@@ -1,16 +1,14 @@
-//! Sums of numbers over the neighbours of each texel on its surface, all with the same weight. Not a fit.
+//! Unweighted sums over the neighbours of each texel on its surface. Weighted fits are in `weighted_fit`.
 
-use crate::denoise::neighbours::Beside;
-use crate::denoise::texel_rows::{WINDOW, lanes, window};
 use fearless_simd::{Simd, f32x8};
 
 use super::kernel::Kernel;
-use super::neighbours::Block;
-use super::texel_rows::ChannelRows;
+use super::neighbours::{Block, NeighbourRow};
+use super::texel_rows::{ChannelRows, WINDOW, lanes, window};
 
-/// Sums over neighbours.
+/// Sums over neighbours up to `steps` steps of `step` texels away.
 pub(crate) struct BoxSums<'a, const N: usize> {
-    pub of: &'a ChannelRows<N>,
+    pub values: &'a ChannelRows<N>,
     pub steps: usize,
     pub step: usize,
 }
@@ -22,10 +20,10 @@ impl<const N: usize> Kernel<N> for BoxSums<'_, N> {
             self.steps,
             self.step,
             #[inline(always)]
-            |beside, at| {
+            |row, at| {
                 let mut terms = [block.simd.splat_f32x8(0.0); N];
                 for (channel, term) in terms.iter_mut().enumerate() {
-                    *term = lanes(block.simd, self.of.beside(beside, channel), at);
+                    *term = lanes(block.simd, self.values.window(row, channel), at);
                 }
                 terms
             },
@@ -35,10 +33,10 @@ impl<const N: usize> Kernel<N> for BoxSums<'_, N> {
 }
 
 impl<const N: usize> ChannelRows<N> {
-    /// What eight texels see of a channel in a row.
+    /// The window that eight texels see of a channel in a neighbour row.
     #[inline(always)]
-    pub fn beside(&self, beside: &Beside<'_>, channel: usize) -> &[f32; WINDOW] {
-        let row = beside.row;
-        window(&self.values, N * row.start + channel * row.stride + beside.column)
+    pub fn window(&self, neighbour_row: &NeighbourRow<'_>, channel: usize) -> &[f32; WINDOW] {
+        let row = neighbour_row.row;
+        window(&self.values, N * row.start + channel * row.stride + neighbour_row.column)
     }
 }

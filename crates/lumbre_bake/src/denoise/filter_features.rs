@@ -1,41 +1,42 @@
-//! A texel's noise, and what tells edges from it. Not the weights that come of them.
+//! The features of a texel that the weights of its neighbours depend on: its noise, and local means by which edges are
+//! told from noise. The weights themselves are in `weighted_fit`.
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
 use super::neighbours::Block;
-use super::plane::{HALF, VALUES};
+use super::plane::{REPLICATES_PER_HALF, VALUES, VALUES_PER_HALF};
 use super::texel_rows::{ChannelRows, lanes};
 use crate::denoise::filter_pass::Smoothed;
 use crate::denoise::kernel::Kernel;
 use crate::denoise::replicates::REPLICATES;
 
-/// Reach over which a texel's noise is averaged, in steps.
+/// The reach, in steps, over which the noise of texels is averaged.
 pub(crate) const NOISE_STEPS: usize = 2;
 
-/// Variance of the replicates' mean, sum of the channels.
+/// The variance of the replicates' mean, sum of the channels.
 pub(crate) struct Variances<'a>(pub &'a Smoothed);
 
 impl Kernel<1> for Variances<'_> {
     #[inline(always)]
     fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; 1]) -> [f32x8<S>; 1] {
-        [sum_of_variances(block.simd, &own_values(block, self.0))]
+        [sum_of_variances(block.simd, &center_values(block, self.0))]
     }
 }
 
-/// The channels of all replicates of the texels themselves.
+/// All replicates of the block's own texels.
 #[inline(always)]
-pub(crate) fn own_values<const N: usize, S: Simd>(
+pub(crate) fn center_values<const N: usize, S: Simd>(
     block: &Block<'_, S>,
-    strips: &ChannelRows<N>,
+    channels: &ChannelRows<N>,
 ) -> [f32x8<S>; VALUES] {
     let mut values = [block.simd.splat_f32x8(0.0); VALUES];
     for (place, value) in values.iter_mut().enumerate() {
-        *value = block.own(strips, place);
+        *value = block.center(channels, place);
     }
     values
 }
 
-/// As [`variance`], sum of the channels.
+/// The variance of the replicates' mean, as `replicates::variance` computes it; sum of the channels.
 #[inline(always)]
 pub(crate) fn sum_of_variances<S: Simd>(simd: S, values: &[f32x8<S>; VALUES]) -> f32x8<S> {
     let mut sum = simd.splat_f32x8(0.0);
@@ -48,16 +49,19 @@ pub(crate) fn sum_of_variances<S: Simd>(simd: S, values: &[f32x8<S>; VALUES]) ->
     sum
 }
 
-/// A texel's noise: its own spread of four is itself noise, the neighbourhood's mean is not. And what tells edges: the means of both halves
-/// over the texels next to it. Each half's weights come from the other half: noise that shaped the weights would pull the mean towards
-/// what is most frequent, and light is lost (Rousselle, Knaus, Zwicker, "Adaptive Rendering with Non-Local Means", 2012).
+/// The features of each texel. Its noise is the mean variance of its neighbourhood, as a variance from only four
+/// replicates is itself noisy. The guides, by which edges are detected, are the means of each half of the replicates
+/// over the adjacent texels. The weights of each half are computed from the other half: weights correlated with the
+/// noise that they average would pull the mean towards the most frequent values, and lose light (Rousselle, Knaus,
+/// Zwicker, "Adaptive Rendering with Non-Local Means", 2012).
 pub(crate) struct Features<'a, const STEP: usize> {
-    /// Reach of the means that tell edges, in steps.
+    /// The reach of the guides, in steps.
     pub steps: usize,
     pub estimates: &'a Smoothed,
     pub variances: &'a ChannelRows<1>,
 }
-/// The channels for the weights of each half, and the noise.
+
+/// Three channels of the guide for each half's weights, and the noise.
 pub(crate) const FEATURES: usize = 2 * 3 + 1;
 pub(crate) const NOISE: usize = 2 * 3;
 
@@ -69,19 +73,19 @@ impl<const STEP: usize> Kernel<FEATURES> for Features<'_, STEP> {
             self.steps,
             STEP,
             #[inline(always)]
-            |beside, at| {
+            |row, at| {
                 let mut sums = [simd.splat_f32x8(0.0); 2 * 3];
                 for (place, sum) in sums.iter_mut().enumerate() {
                     let (half, channel) = (1 - place / 3, place % 3);
-                    let first = 3 * HALF * half + channel;
-                    let one: f32x8<S> = lanes(simd, self.estimates.beside(beside, first), at);
-                    let two: f32x8<S> = lanes(simd, self.estimates.beside(beside, first + 3), at);
+                    let first = VALUES_PER_HALF * half + channel;
+                    let one: f32x8<S> = lanes(simd, self.estimates.window(row, first), at);
+                    let two: f32x8<S> = lanes(simd, self.estimates.window(row, first + 3), at);
                     *sum = one + two;
                 }
                 sums
             },
         );
-        let scale = simd.splat_f32x8(1.0) / (count * HALF as f32).max(1.0);
+        let scale = simd.splat_f32x8(1.0) / (count * REPLICATES_PER_HALF as f32).max(1.0);
         let mut features = [block.mean(self.variances, 0, NOISE_STEPS, STEP); FEATURES];
         for (guide, sum) in features.iter_mut().zip(sums) {
             *guide = sum * scale;

@@ -1,19 +1,21 @@
-//! One pass of the smoothing over all texels: how far it reaches, and what it hands to the next. Not what it computes.
+//! The parameters of one smoothing pass over all texels, and the type of its input and output. What a pass computes is
+//! in `smooth`.
 
 use super::plane::VALUES;
 use super::texel_rows::ChannelRows;
 
-/// The channels of the estimates, and the squared bias, mean of the channels.
+/// The estimates of all replicates, and the squared bias that smoothing has brought so far, mean of the channels.
 pub(crate) type Smoothed = ChannelRows<{ VALUES + 1 }>;
 pub(crate) const BIAS: usize = VALUES;
 
-/// One pass over all texels.
+/// The parameters of a pass.
 pub(crate) struct FilterPass {
-    /// Texels at which a neighbour weighs e⁻¹; and where things are near, the share of their harmonic mean distance, inverted.
+    /// The distance in texels at which a neighbour has weight e⁻¹.
     pub width: f32,
+    /// Where other surfaces are near, that distance is less than their harmonic mean distance divided by this.
     pub near: f32,
-    /// Reach of the means that tell edges, in steps.
+    /// The reach, in steps, of the means by which edges are detected.
     pub guide_steps: usize,
-    /// Of the variance of what goes in, the part that chance leaves in the squared bias.
-    pub chance: f32,
+    /// The share of the input's variance that noise alone leaves in the estimate of the squared bias.
+    pub bias_noise: f32,
 }

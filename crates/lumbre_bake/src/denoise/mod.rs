@@ -1,4 +1,5 @@
-//! Smoothing of what was sampled, over texels of one surface, and what that costs in bias. Not the samples.
+//! Denoising: smooths sampled light over texels of one surface, and estimates the bias that this brings. Where the
+//! samples come from is of no concern here.
 
 pub(crate) mod box_sums;
 pub(crate) mod filter_features;

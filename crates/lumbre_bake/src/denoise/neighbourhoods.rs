@@ -1,29 +1,32 @@
-//! Which texels lie around a texel on the same surface. Not what is done with them.
+//! The covered texels in rows, with the surface that each lies on, for computations over neighbours on the same
+//! surface. What is computed is in the kernels.
 
-use crate::denoise::surface::{NONE, Surface};
 use std::collections::HashMap;
 
 use rayon::prelude::*;
 
 use super::box_sums::BoxSums;
+use super::surface::{NONE, Surface};
 use super::texel_rows::{ChannelRows, TexelRows};
-use crate::coverage::footprint::Texel;
+use crate::coverage::footprint::{Texel, open_texels};
 use crate::scene::{BakeScene, LightmapLayout};
 
-/// Who lies around whom.
+/// The neighbourhoods of all covered texels.
 pub(crate) struct Neighbourhoods<'a> {
     scene: &'a BakeScene,
     pub texels: &'a [Texel],
-    /// Of each texel of all maps, its place among the covered ones; [`NONE`] if it shows nothing in the open.
-    places: Vec<u32>,
+    /// For each texel of all maps, its index among the covered ones; [`NONE`] if it is not covered, or hidden.
+    covered: Vec<u32>,
     grid: TexelRows,
-    /// Of each map, its first row in the grid; and of each row there, its first texel of all maps.
+    /// The first row of each map in the grid.
     first_rows: Vec<usize>,
-    firsts: Vec<usize>,
+    /// The first texel of each row, as an index into all maps.
+    row_starts: Vec<usize>,
 }
 
 impl<'a> Neighbourhoods<'a> {
-    /// Texels of different groups are not compared with each other; an empty list has all in one.
+    /// Texels of different `groups` are no neighbours of each other; an empty list puts all in one group. `charts`
+    /// holds the chart of each triangle.
     pub fn new(
         scene: &'a BakeScene,
         layout: &LightmapLayout,
@@ -33,29 +36,29 @@ impl<'a> Neighbourhoods<'a> {
     ) -> Self {
         let mut surfaces: Vec<Surface> = Vec::new();
         let mut numbers: HashMap<(u32, [u32; 3], u32), u32> = HashMap::new();
-        let mut places = vec![NONE; layout.texels];
-        let mut ground = vec![NONE; layout.texels];
-        for (index, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
+        let mut covered = vec![NONE; layout.texels];
+        let mut texel_surfaces = vec![NONE; layout.texels];
+        for (index, texel) in open_texels(texels) {
             let (chart, normal) =
                 (charts[texel.triangle as usize], scene.triangles[texel.triangle as usize].normal);
-            let group = groups.get(index).copied().unwrap_or(0);
+            let group = groups.get(index.place()).copied().unwrap_or(0);
             let key = (chart, normal.to_array().map(f32::to_bits), group);
             let surface = *numbers.entry(key).or_insert_with(|| {
                 surfaces.push(Surface { chart, normal, group });
                 surfaces.len() as u32 - 1
             });
-            places[texel.index.place()] = index as u32;
-            ground[texel.index.place()] = surface;
+            covered[texel.index.place()] = index.0;
+            texel_surfaces[texel.index.place()] = surface;
         }
         let sizes = layout.maps.iter().map(|map| (map.width, map.height));
-        let mut grid = TexelRows::new(sizes, ground.into_iter(), surfaces);
+        let mut grid = TexelRows::new(sizes, texel_surfaces.into_iter(), surfaces);
         grid.stop = scene.stop.clone();
-        let (mut first_rows, mut firsts) = (Vec::new(), Vec::new());
+        let (mut first_rows, mut row_starts) = (Vec::new(), Vec::new());
         for map in &layout.maps {
-            first_rows.push(firsts.len());
-            firsts.extend((0..map.height as usize).map(|row| map.first + row * map.width as usize));
+            first_rows.push(row_starts.len());
+            row_starts.extend((0..map.height as usize).map(|row| map.first + row * map.width as usize));
         }
-        Self { scene, texels, places, grid, first_rows, firsts }
+        Self { scene, texels, covered, grid, first_rows, row_starts }
     }
 
     /// Length of a texel's side on its surface, canonical units.
@@ -63,34 +66,35 @@ impl<'a> Neighbourhoods<'a> {
         texel.side(self.scene)
     }
 
-    /// The texels in rows.
+    /// The rows of all maps.
     pub fn grid(&self) -> &TexelRows {
         &self.grid
     }
 
-    /// Numbers of each covered texel, by its place in the list of them.
-    pub fn fill<const N: usize>(&self, of: impl Fn(usize) -> [f32; N] + Sync) -> ChannelRows<N> {
-        self.grid.fill(|row, column| of(self.places[self.firsts[row] + column] as usize))
+    /// Channels with the values of each covered texel that is not hidden; `value_of` takes its index among the covered
+    /// ones.
+    pub fn fill<const N: usize>(&self, value_of: impl Fn(usize) -> [f32; N] + Sync) -> ChannelRows<N> {
+        self.grid.fill(|row, column| value_of(self.covered[self.row_starts[row] + column] as usize))
     }
 
-    /// Of each texel, sums of numbers over the texels of the same chart and about the same normal, up to so many steps each way: of those in
-    /// every `step`th row and column from the texel's. Zero of a hidden one.
+    /// For each texel, the sums over neighbours of the same chart and about the same normal: those in every `step`th
+    /// row and column, up to `steps` steps each way. Zero for hidden texels.
     pub fn sums<const N: usize>(
         &self,
-        of: impl Fn(usize) -> [f32; N] + Sync,
+        value_of: impl Fn(usize) -> [f32; N] + Sync,
         steps: usize,
         step: usize,
     ) -> Vec<[f32; N]> {
-        let sums = self.grid.compute(&BoxSums { of: &self.fill(of), steps, step });
+        let sums = self.grid.compute(&BoxSums { values: &self.fill(value_of), steps, step });
         self.read(&sums)
     }
 
-    /// What strips hold of each texel, zero of a hidden one.
-    pub fn read<const N: usize>(&self, strips: &ChannelRows<N>) -> Vec<[f32; N]> {
-        let of = |texel: &Texel| {
+    /// The values of each covered texel; zero for hidden ones.
+    pub fn read<const N: usize>(&self, channels: &ChannelRows<N>) -> Vec<[f32; N]> {
+        let value_of = |texel: &Texel| {
             let row = self.first_rows[texel.object as usize] + texel.y as usize;
-            if texel.is_hidden() { [0.0; N] } else { self.grid.get(strips, row, texel.x as usize) }
+            if texel.is_hidden() { [0.0; N] } else { self.grid.get(channels, row, texel.x as usize) }
         };
-        self.texels.par_iter().map(of).collect()
+        self.texels.par_iter().map(value_of).collect()
     }
 }

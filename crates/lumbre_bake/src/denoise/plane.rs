@@ -1,27 +1,29 @@
-//! Weighted planes through the values of a neighbourhood, one for each half of the replicates, of eight texels at once. Not the weights.
+//! Weighted planes fitted to the values of a neighbourhood, one for each half of the replicates, for eight texels at
+//! once. The weights are in `weighted_fit`.
 
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
-use super::neighbours::OWN;
+use super::neighbours::CENTER;
 use super::texel_rows::{WINDOW, lanes};
 use crate::denoise::replicates::REPLICATES;
 
-/// Replicates of one half: the values of one plane.
-pub(crate) const HALF: usize = REPLICATES / 2;
-/// Numbers of a texel: the channels of all replicates; and of a half.
+/// Replicates in a half.
+pub(crate) const REPLICATES_PER_HALF: usize = REPLICATES / 2;
+/// Values of a texel: three channels of all replicates, and of the replicates of a half.
 pub(crate) const VALUES: usize = 3 * REPLICATES;
-pub(crate) const OF_HALF: usize = 3 * HALF;
+pub(crate) const VALUES_PER_HALF: usize = 3 * REPLICATES_PER_HALF;
 
-/// Weighted sums of planes a + b x + c y through the values of each half.
+/// The weighted sums from which planes a + b x + c y through the values of each half are fitted.
 pub(crate) struct Planes<S: Simd> {
-    /// Of the values, and of those times x and y.
+    /// Weighted sums of the values, and of the values times x and times y.
     sums: [[f32x8<S>; VALUES]; 3],
-    /// Of 1, x, y, x², x y, y²: of each half.
+    /// Weighted sums of 1, x, y, x², x y and y², for each half.
     weights: [[f32x8<S>; 2]; 6],
     simd: S,
 }
 
-/// Square texels of spread below which a slope counts as unknown.
+/// Variance of the neighbours' positions, in square texels, below which their slope counts as unknown: the ridge of the
+/// regression.
 const RIDGE: f32 = 0.002;
 
 impl<S: Simd> Planes<S> {
@@ -31,7 +33,7 @@ impl<S: Simd> Planes<S> {
         Self { sums: [[zero; VALUES]; 3], weights: [[zero; 2]; 6], simd }
     }
 
-    /// The weights of a half's neighbours in the row at y, `step` apart and the middle one at 0.
+    /// Adds the weights of a half's neighbours in the row at y: `step` texels apart, with the middle one at x = 0.
     #[inline(always)]
     pub fn add_weights<const COLUMNS: usize>(
         &mut self,
@@ -56,7 +58,8 @@ impl<S: Simd> Planes<S> {
         self.weights[5][half] += sum * (y * y);
     }
 
-    /// Their values of one colour. Some eighty values of about one size: single precision keeps six digits of their sums.
+    /// Adds the values of a replicate at these neighbours. Single precision keeps six digits of a sum of some eighty
+    /// values of similar size.
     #[inline(always)]
     pub fn add_values<const COLUMNS: usize>(
         &mut self,
@@ -70,7 +73,7 @@ impl<S: Simd> Planes<S> {
         let (mut sums, mut with_x) = ([zero; 3], [zero; 3]);
         for (place, weight) in weights.iter().enumerate() {
             let x = place as f32 * step as f32 - (COLUMNS / 2 * step) as f32;
-            let at = OWN - COLUMNS / 2 * step + place * step;
+            let at = CENTER - COLUMNS / 2 * step + place * step;
             for channel in 0..3 {
                 let term = *weight * lanes::<S, f32x8<S>>(self.simd, values[channel], at);
                 sums[channel] += term;
@@ -85,7 +88,7 @@ impl<S: Simd> Planes<S> {
         }
     }
 
-    /// Writes the values of the planes at (0, 0); leaves a colour that is there if the plane's is not finite.
+    /// Writes the planes' values at (0, 0), but keeps the colour that is there if the plane's is not finite.
     #[inline(always)]
     pub fn at_center(&self, values: &mut [f32x8<S>; VALUES]) {
         let (simd, zero) = (self.simd, self.simd.splat_f32x8(0.0));
@@ -94,12 +97,12 @@ impl<S: Simd> Planes<S> {
             let (sx, sy) = (self.weights[1][half] / weight, self.weights[2][half] / weight);
             let (sxx, sxy) = (self.weights[3][half] / weight, self.weights[4][half] / weight);
             let syy = self.weights[5][half] / weight;
-            // Covariances of the neighbours' places.
+            // The covariances of the neighbours' positions, with the ridge.
             let (xx, xy, yy) = (sxx - sx * sx + RIDGE, sxy - sx * sy, syy - sy * sy + RIDGE);
             let inverse = simd.splat_f32x8(1.0) / (xx * yy - xy * xy);
             let (xx, xy, yy) = (xx * inverse, -(xy * inverse), yy * inverse);
             let (right, down) = (yy * -sx + xy * -sy, xy * -sx + xx * -sy);
-            for replicate in half * HALF..(half + 1) * HALF {
+            for replicate in half * REPLICATES_PER_HALF..(half + 1) * REPLICATES_PER_HALF {
                 let mut fitted = [zero; 3];
                 let mut finite = simd.splat_mask32x8(true);
                 for (channel, fitted) in fitted.iter_mut().enumerate() {

@@ -1,22 +1,23 @@
-//! What smoothing may have done to the light besides taking its noise away. Not the smoothing.
+//! Estimates the squared bias of smoothing: the error that it adds to the light while it removes noise.
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::filter_features::own_values;
+use super::filter_features::center_values;
 use super::neighbours::Block;
-use super::plane::{OF_HALF, VALUES};
+use super::plane::{VALUES, VALUES_PER_HALF};
 use super::texel_rows::{ChannelRows, lanes};
 use crate::denoise::filter_pass::Smoothed;
 use crate::denoise::kernel::Kernel;
 
-/// Texels around one over which differences are averaged with their sign, and then without it.
+/// Steps each way over which signed differences are averaged, and over which their products are averaged then.
 const BLOCK_RADIUS: usize = 1;
 const BIAS_RADIUS: usize = 3;
 
-/// The smoothed value of one half against the raw values of the other, which know nothing of it: the product of its differences
-/// to two replicates, each averaged over a block, has the square of the bias as its mean, and the smoothed value's own variance.
-/// (A single texel's squared difference says the same with ten times the noise.) May be negative, by chance.
-/// Blocks are of texels `STEP` apart.
+/// Compares the smoothed value of one half with the raw values of the other, which are independent of it. The product
+/// of its differences to two raw replicates, each averaged over a block, has as its expected value the squared bias
+/// plus the variance of the smoothed value, which is subtracted. (The squared difference of a single texel has the same
+/// expected value, with ten times the noise.) The result may be negative by chance. The texels of a block are `STEP`
+/// apart.
 pub(crate) struct Products<'a, const STEP: usize> {
     pub raw: &'a Smoothed,
     pub smoothed: &'a ChannelRows<VALUES>,
@@ -31,17 +32,17 @@ impl<const STEP: usize> Kernel<1> for Products<'_, STEP> {
             BLOCK_RADIUS,
             STEP,
             #[inline(always)]
-            |beside, at| {
+            |row, at| {
                 let mut differences = [zero; VALUES];
-                for place in 0..OF_HALF {
+                for place in 0..VALUES_PER_HALF {
                     let (half, channel) = (place / 3, place % 3);
-                    let first = half * OF_HALF + channel;
-                    let one: f32x8<S> = lanes(simd, self.smoothed.beside(beside, first), at);
-                    let two: f32x8<S> = lanes(simd, self.smoothed.beside(beside, first + 3), at);
+                    let first = half * VALUES_PER_HALF + channel;
+                    let one: f32x8<S> = lanes(simd, self.smoothed.window(row, first), at);
+                    let two: f32x8<S> = lanes(simd, self.smoothed.window(row, first + 3), at);
                     let mean = (one + two) * 0.5;
                     for replicate in 0..2 {
-                        let raw = (1 - half) * OF_HALF + 3 * replicate + channel;
-                        let raw: f32x8<S> = lanes(simd, self.raw.beside(beside, raw), at);
+                        let raw = (1 - half) * VALUES_PER_HALF + 3 * replicate + channel;
+                        let raw: f32x8<S> = lanes(simd, self.raw.window(row, raw), at);
                         differences[first + 3 * replicate] = mean - raw;
                     }
                 }
@@ -50,22 +51,22 @@ impl<const STEP: usize> Kernel<1> for Products<'_, STEP> {
         );
         let count = count.max(1.0);
         let scale = simd.splat_f32x8(1.0) / (count * count);
-        let own = own_values(block, self.smoothed);
-        let mut both = zero;
+        let center = center_values(block, self.smoothed);
+        let mut total = zero;
         for half in 0..2 {
-            let (mut product, mut chance) = (zero, zero);
-            for first in half * OF_HALF..half * OF_HALF + 3 {
+            let (mut product, mut variance) = (zero, zero);
+            for first in half * VALUES_PER_HALF..half * VALUES_PER_HALF + 3 {
                 product += sums[first] * sums[first + 3];
-                let apart = own[first] - own[first + 3];
-                chance += apart * apart;
+                let difference = center[first] - center[first + 3];
+                variance += difference * difference;
             }
-            both += product * scale - chance * 0.25;
+            total += product * scale - variance * 0.25;
         }
-        [both / 6.0]
+        [total / 6.0]
     }
 }
 
-/// The mean of the products around.
+/// The mean of the products over the neighbours.
 #[inline(always)]
 pub(crate) fn squared_bias<S: Simd>(
     block: &Block<'_, S>,

@@ -1,8 +1,9 @@
-//! Surfaces over which light is compared and smoothed: triangles of one chart whose normals are about the same. Not the texels on them.
+//! Surfaces over which light is compared and smoothed: triangles of one chart whose normals are about the same. The
+//! texels on them are in `texel_rows`.
 
 use glam::Vec3;
 
-/// Triangles of one chart with the very same normal, in texels of one group.
+/// Triangles of one chart with exactly the same normal, in texels of one group.
 #[derive(Clone, Copy)]
 pub(crate) struct Surface {
     pub chart: u32,
@@ -10,13 +11,14 @@ pub(crate) struct Surface {
     pub group: u32,
 }
 
-/// No texel, no surface.
+/// The surface of a cell without a texel.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Whether light may be compared over two surfaces.
-pub(crate) fn goes_on(surfaces: &[Surface], surface: u32, other: u32) -> bool {
-    let [Some(own), Some(other)] = [surface, other].map(|index| surfaces.get(index as usize)) else {
+/// Whether light is continuous over two surfaces, so that texels on them are neighbours: of one chart and one group,
+/// with similar normals.
+pub(crate) fn is_continuous(surfaces: &[Surface], surface: u32, other: u32) -> bool {
+    let [Some(first), Some(second)] = [surface, other].map(|index| surfaces.get(index as usize)) else {
         return false;
     };
-    own.chart == other.chart && own.group == other.group && own.normal.dot(other.normal) > 0.9
+    first.chart == second.chart && first.group == second.group && first.normal.dot(second.normal) > 0.9
 }

@@ -1,5 +1,6 @@
-//! The covered texels of all maps as rows with margins, to be computed eight side by side: each lane takes the very steps that its texel
-//! alone would take, so that the bits are the same whatever instructions the machine has. Not what is computed, nor who lies around whom.
+//! The covered texels of all maps as rows with margins, for SIMD computation of eight texels side by side. Each lane
+//! takes exactly the steps that scalar code for its texel would take, so that the bits are the same at every SIMD
+//! level. Neighbours are found in `neighbours`.
 
 use std::ops::Range;
 
@@ -9,53 +10,57 @@ use rayon::prelude::*;
 use crate::cancel_token::CancelToken;
 use crate::denoise::surface::{NONE, Surface};
 
-/// Texels side by side.
+/// Texels that are computed side by side.
 pub(crate) const LANES: usize = 8;
-/// Texels to each side that a neighbourhood may reach.
+/// The farthest that a neighbourhood may reach to each side, in texels.
 pub(crate) const MARGIN: usize = 12;
-/// Cells of a row that no texel of its map has.
+/// Cells of a row that hold no texel of its map.
 pub(crate) const BESIDE_A_ROW: usize = MARGIN + LANES - 1;
-/// What eight texels see of a row.
+/// Cells of a row within reach of eight texels.
 pub(crate) const WINDOW: usize = MARGIN + LANES + MARGIN;
 
-/// Where the rows of all maps begin, and which of their texels are covered.
+/// The rows of all maps, one after the other, with the surface of each of their cells.
 pub(crate) struct TexelRows {
     pub rows: Vec<MapRow>,
-    /// First columns of the blocks of all rows.
+    /// The first columns of the blocks of eight texels, of all rows.
     pub blocks: Vec<u32>,
-    /// Of each cell of the rows its surface; [`NONE`] where nothing is covered, and in the margins.
-    pub ground: Vec<u32>,
+    /// The surface of each cell; [`NONE`] where no texel is covered, and in the margins.
+    pub cell_surfaces: Vec<u32>,
     pub surfaces: Vec<Surface>,
-    /// Cells of all rows, without the last margin.
+    /// The number of cells of all rows, without the last margin.
     cells: usize,
-    /// The instructions that this machine has; every level computes the same bits.
+    /// The SIMD level of this machine; every level computes the same bits.
     pub level: Level,
-    /// Whether nobody waits for what is computed any more.
+    /// Cancelled when the result is no longer wanted.
     pub stop: CancelToken,
 }
 
 /// A row of a map.
 pub(crate) struct MapRow {
-    /// Its first cell, and how many there are: a margin, the texels, and what a last block hangs over. The next row's margin is also
-    /// this one's.
+    /// Its first cell.
     pub start: usize,
+    /// The number of its cells: a margin, the texels, and room for the lanes of a last block beyond them. The margin of
+    /// the next row also serves as this one's right margin.
     pub stride: usize,
-    /// Rows of the same map before and after it.
+    /// The number of rows of the same map above and below it.
     pub before: u32,
     pub after: u32,
+    /// Its blocks, a range of [`TexelRows::blocks`].
     pub blocks: Range<usize>,
 }
 
-/// `N` numbers of each cell, row by row: a row of the first, a row of the second, and so on. Zero where no texel is.
+/// `N` channels of each cell, row by row: each row holds all values of its first channel, then of the second, and so
+/// on. Zero where there is no texel.
 pub(crate) struct ChannelRows<const N: usize> {
     pub values: Vec<f32>,
 }
 
 impl TexelRows {
-    /// Of maps of these widths and heights, and the surface of each of their texels, [`NONE`] if it counts nowhere.
+    /// The rows of maps with these widths and heights; `texel_surfaces` yields the surface of each of their texels,
+    /// [`NONE`] for those that are left out.
     pub fn new(
         sizes: impl Iterator<Item = (u32, u32)>,
-        mut ground: impl Iterator<Item = u32>,
+        mut texel_surfaces: impl Iterator<Item = u32>,
         surfaces: Vec<Surface>,
     ) -> Self {
         let (mut rows, mut blocks, mut cells) = (Vec::new(), Vec::new(), Vec::new());
@@ -63,10 +68,12 @@ impl TexelRows {
             for row in 0..height {
                 let start = cells.len();
                 cells.resize(start + MARGIN, NONE);
-                cells.extend(ground.by_ref().take(width as usize));
+                cells.extend(texel_surfaces.by_ref().take(width as usize));
                 cells.resize(start + width as usize + BESIDE_A_ROW, NONE);
                 let (first_block, mut column) = (blocks.len(), 0);
-                while let Some(gap) = cells[start + MARGIN + column..].iter().position(|&own| own != NONE) {
+                while let Some(gap) =
+                    cells[start + MARGIN + column..].iter().position(|&surface| surface != NONE)
+                {
                     blocks.push((column + gap) as u32);
                     column += gap + LANES;
                 }
@@ -78,61 +85,61 @@ impl TexelRows {
         let count = cells.len();
         cells.resize(count + MARGIN, NONE);
         let (level, stop) = (Level::new(), CancelToken::default());
-        Self { rows, blocks, ground: cells, surfaces, cells: count, level, stop }
+        Self { rows, blocks, cell_surfaces: cells, surfaces, cells: count, level, stop }
     }
 
-    /// Numbers of each covered texel, which is told by its row (of all maps) and column.
-    pub fn fill<const N: usize>(&self, of: impl Fn(usize, usize) -> [f32; N] + Sync) -> ChannelRows<N> {
-        let mut strips = self.strips();
-        self.by_rows(&mut strips, |index, strip| {
+    /// Channels with values for all covered texels; `value_of` takes the row (among those of all maps) and the column.
+    pub fn fill<const N: usize>(&self, value_of: impl Fn(usize, usize) -> [f32; N] + Sync) -> ChannelRows<N> {
+        let mut channels = self.zeros();
+        self.for_each_row(&mut channels, |index, values| {
             let row = &self.rows[index];
-            let ground = &self.ground[row.start + MARGIN..row.start + row.stride];
-            for (column, _) in ground.iter().enumerate().filter(|(_, surface)| **surface != NONE) {
-                for (channel, value) in of(index, column).into_iter().enumerate() {
-                    strip[channel * row.stride + MARGIN + column] = value;
+            let surfaces = &self.cell_surfaces[row.start + MARGIN..row.start + row.stride];
+            for (column, _) in surfaces.iter().enumerate().filter(|(_, surface)| **surface != NONE) {
+                for (channel, value) in value_of(index, column).into_iter().enumerate() {
+                    values[channel * row.stride + MARGIN + column] = value;
                 }
             }
         });
-        strips
+        channels
     }
 
-    /// Zero everywhere.
-    pub fn strips<const N: usize>(&self) -> ChannelRows<N> {
+    /// Channels that are zero everywhere.
+    pub fn zeros<const N: usize>(&self) -> ChannelRows<N> {
         ChannelRows { values: vec![0.0; N * self.cells + MARGIN] }
     }
 
-    /// Writes every row's strips, each for itself.
-    pub fn by_rows<const N: usize>(
+    /// Calls `write` in parallel with every row's index and the values of all its channels.
+    pub fn for_each_row<const N: usize>(
         &self,
-        strips: &mut ChannelRows<N>,
+        channels: &mut ChannelRows<N>,
         write: impl Fn(usize, &mut [f32]) + Sync,
     ) {
-        let mut rest = &mut strips.values[..];
+        let mut rest = &mut channels.values[..];
         let mut rows = Vec::with_capacity(self.rows.len());
         for row in &self.rows {
-            let (own, after) = rest.split_at_mut(N * row.stride);
-            rows.push(own);
+            let (values, after) = rest.split_at_mut(N * row.stride);
+            rows.push(values);
             rest = after;
         }
         let rows = rows.into_par_iter().enumerate().filter(|_| !self.stop.is_cancelled());
-        rows.for_each(|(index, row)| write(index, row));
+        rows.for_each(|(index, values)| write(index, values));
     }
 
-    /// What the strips hold of a texel.
-    pub fn get<const N: usize>(&self, strips: &ChannelRows<N>, row: usize, column: usize) -> [f32; N] {
+    /// The values of a texel.
+    pub fn get<const N: usize>(&self, channels: &ChannelRows<N>, row: usize, column: usize) -> [f32; N] {
         let row = &self.rows[row];
         let first = N * row.start + MARGIN + column;
-        std::array::from_fn(|channel| strips.values[first + channel * row.stride])
+        std::array::from_fn(|channel| channels.values[first + channel * row.stride])
     }
 }
 
-/// What is seen from the cell `at` on.
+/// The window that begins at `at`.
 #[inline(always)]
 pub(crate) fn window<T>(values: &[T], at: usize) -> &[T; WINDOW] {
     values[at..].first_chunk().expect("rows end with margins")
 }
 
-/// Eight of a window.
+/// Eight values of a window, from `at` on.
 #[inline(always)]
 pub(crate) fn lanes<S: Simd, V: SimdBase<S>>(simd: S, window: &[V::Element; WINDOW], at: usize) -> V {
     V::from_slice(simd, &window[at..at + LANES])

@@ -1,12 +1,12 @@
-//! The light cuts of blocks of texels: neighbours have the same, so that what they sample together can be smoothed together. Not the cut
-//! itself: that is `light_cut`.
+//! One light cut for each block of texels: all texels of a block have the same cut, so that the estimates from their
+//! shared samples can be smoothed together. The cut itself is in `light_cut`.
 
 use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use crate::coverage::blocks::Blocks;
 use crate::coverage::footprint::{Texel, receiver};
+use crate::coverage::texel_groups::TexelGroups;
 use crate::scene::Receiver;
 use crate::sources::light_cut::LightCut;
 use crate::sources::light_sources::Sources;
@@ -17,25 +17,27 @@ const BLOCK: u32 = 16;
 /// The light cuts of all blocks.
 pub(crate) struct LightCuts {
     cuts: Vec<LightCut>,
-    /// Of each block that shows something, a receiver in its middle, and how far its others are.
+    /// For each block with texels in the open, a receiver in the middle of the block and the distance to the block's
+    /// farthest point.
     anchors: Vec<Option<(Receiver, f32)>>,
-    blocks: Blocks,
+    blocks: TexelGroups,
 }
 
 impl LightCuts {
-    /// `charts` tells the chart of each triangle.
+    /// Cuts of all blocks; `charts` holds the chart of each triangle.
     pub fn new(sources: &Sources<'_>, texels: &[Texel], charts: &[u32]) -> Self {
-        let blocks = Blocks::new(texels, charts, BLOCK);
+        let blocks = TexelGroups::blocks(texels, charts, BLOCK);
         let anchor = |members: &Vec<u32>| {
-            let middle = |&place: &u32| -> Option<Receiver> {
-                let texel = &texels[place as usize];
+            let middle_of = |&member: &u32| -> Option<Receiver> {
+                let texel = &texels[member as usize];
                 Some(receiver(sources.scene, &texel.point(sources.scene, 0.5, 0.5)?))
             };
-            let anchor = members.get(members.len() / 2).and_then(middle)?;
-            let apart = |other: Receiver| other.position.distance(anchor.position);
-            let farthest = members.iter().filter_map(middle).map(apart).fold(0.0, f32::max);
-            let texel = texels[members[0] as usize].side(sources.scene);
-            Some((anchor, farthest + if texel.is_finite() { texel } else { 0.0 }))
+            let anchor = members.get(members.len() / 2).and_then(middle_of)?;
+            let distance = |other: Receiver| other.position.distance(anchor.position);
+            let farthest = members.iter().filter_map(middle_of).map(distance).fold(0.0, f32::max);
+            // The middles do not reach to the edges of the block: add a texel.
+            let side = texels[members[0] as usize].side(sources.scene);
+            Some((anchor, farthest + if side.is_finite() { side } else { 0.0 }))
         };
         let anchors: Vec<Option<(Receiver, f32)>> = blocks.members.par_iter().map(anchor).collect();
         let cut = |anchor: &Option<(Receiver, f32)>| {
@@ -45,48 +47,49 @@ impl LightCuts {
         Self { cuts, anchors, blocks }
     }
 
-    /// Some lamps share samples in the blocks of some texels: those are named by a texel's place and the lamp.
+    /// Makes lamps share samples: each pair is the index of a texel, which stands for its whole block, and the lamp
+    /// that shares samples there.
     pub fn share(&mut self, sources: &Sources<'_>, lamps: &[(u32, u32)]) {
-        let mut of_blocks: Vec<(u32, u32)> =
-            lamps.iter().map(|&(place, lamp)| (self.blocks.of[place as usize], lamp)).collect();
-        of_blocks.sort_unstable();
-        of_blocks.dedup();
-        let groups: Vec<&[(u32, u32)]> = of_blocks.chunk_by(|a, b| a.0 == b.0).collect();
+        let mut lamps_by_block: Vec<(u32, u32)> =
+            lamps.iter().map(|&(texel, lamp)| (self.blocks.group_of[texel as usize], lamp)).collect();
+        lamps_by_block.sort_unstable();
+        lamps_by_block.dedup();
+        let groups: Vec<&[(u32, u32)]> = lamps_by_block.chunk_by(|a, b| a.0 == b.0).collect();
         let cut = |group: &&[(u32, u32)]| {
             let block = group[0].0;
             let lamps: Vec<u32> = group.iter().map(|(_, lamp)| *lamp).collect();
             let (anchor, reach) = self.anchors[block as usize]?;
             Some((block, sources.cut(&anchor, reach, &lamps)))
         };
-        let found: Vec<(u32, LightCut)> = groups.par_iter().filter_map(cut).collect();
-        for (block, cut) in found {
+        let new_cuts: Vec<(u32, LightCut)> = groups.par_iter().filter_map(cut).collect();
+        for (block, cut) in new_cuts {
             self.cuts[block as usize] = cut;
         }
     }
 
-    /// That of a covered texel.
+    /// The cut of a covered texel.
     pub fn of(&self, place: usize) -> &LightCut {
-        &self.cuts[self.blocks.of[place] as usize]
+        &self.cuts[self.blocks.group_of[place] as usize]
     }
 
     /// The number of a covered texel's block.
     pub fn block(&self, place: usize) -> u32 {
-        self.blocks.of[place]
+        self.blocks.group_of[place]
     }
 
-    /// Whether some texel has sources that share samples.
+    /// Whether any texel has sources that share samples.
     pub fn share_samples(&self) -> bool {
         self.cuts.iter().any(|cut| !cut.shared.is_empty())
     }
 
-    /// Of each covered texel a number for the sources that have samples of their own there.
+    /// For each covered texel, a number that identifies the set of sources with samples of their own there.
     pub fn keys(&self) -> Vec<u32> {
         let mut numbers: HashMap<u64, u32> = HashMap::new();
         let mut number = |cut: &LightCut| {
             let next = numbers.len() as u32;
             *numbers.entry(cut.key()).or_insert(next)
         };
-        let of_cuts: Vec<u32> = self.cuts.iter().map(&mut number).collect();
-        self.blocks.of.iter().map(|&block| of_cuts[block as usize]).collect()
+        let block_keys: Vec<u32> = self.cuts.iter().map(&mut number).collect();
+        self.blocks.group_of.iter().map(|&block| block_keys[block as usize]).collect()
     }
 }

@@ -1,4 +1,5 @@
-//! What may stand between a tile of texels and point, spot and directional lights. Not between it and emissive surfaces: that is `shafts`.
+//! The visibility of point, spot and directional lights from a tile of texels. That of emissive surfaces is in
+//! `shafts`.
 
 use glam::DVec3;
 use lumbre_optics::{LightKind, SpotCone};
@@ -9,7 +10,8 @@ use crate::visibility::cut_out::{Pieces, Shadow};
 use crate::visibility::shadow_clipping::{LightVisibility, Origin};
 use crate::visibility::shaft::{Area, Shaft, WIDEST};
 
-/// What is known of the ways of some lights, by ascending number, to an area of a flat surface. `texel_side` is that of its texels.
+/// What is known about the visibility of some lights, in ascending order of their indices, from a flat area.
+/// `texel_side` is the side length of its texels. Lights that are left out need shadow rays.
 pub(crate) fn visibilities(
     sources: &Sources<'_>,
     lights: &[u32],
@@ -33,20 +35,21 @@ pub(crate) fn visibilities(
     lights.iter().filter_map(of_light).collect()
 }
 
-/// Whether a texel's light by a few of its points, and by the middles of its pieces, is that of all of it: the light is not as near as texels
-/// are large, no sharp edge of its cone goes through the area, and it is not so far away that numbers do not tell the shadows' edges.
+/// Whether a few points of a texel, and the centroids of the pieces that shadows cut it into, give the light of the
+/// whole texel: the light is several texels away, no sharp edge of its cone crosses the area, and it is not so far away
+/// that rounding would blur the edges of shadows.
 fn is_even(scene: &BakeScene, placed: &PlacedLight, area: &Area, texel_side: f32) -> bool {
     if placed.light.kind == LightKind::Directional {
         return true;
     }
     let place = scene.space.place(placed.position);
     let [a, b, c, d] = area.corners;
-    let along = |side: DVec3| {
+    let projected = |side: DVec3| {
         let squared = side.length_squared();
         if squared > 0.0 { side * ((place - a).dot(side) / squared).clamp(0.0, 1.0) } else { DVec3::ZERO }
     };
-    let away = place.distance(a + along(b - a) + along(d - a));
-    if !(away >= NEAR * f64::from(texel_side) && place.abs().max_element() < AFAR) {
+    let distance = place.distance(a + projected(b - a) + projected(d - a));
+    if !(distance >= NEAR * f64::from(texel_side) && place.abs().max_element() < FAR) {
         return false;
     }
     let Some(cone) = placed.light.spot.filter(|cone| !cone.is_everywhere()) else { return true };
@@ -59,14 +62,14 @@ fn is_even(scene: &BakeScene, placed: &PlacedLight, area: &Area, texel_side: f32
     let from_light = middle - place;
     let spread = (reach / from_light.length()).min(1.0).asin();
     let angle = placed.axis.angle_between(from_light);
-    let beside = angle + spread < inner || angle - spread > outer;
-    beside || outer - inner > spread
+    let is_off_edge = angle + spread < inner || angle - spread > outer;
+    is_off_edge || outer - inner > spread
 }
 
 /// Whether a light ends before it reaches an area.
 fn is_out_of_range(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> bool {
     let range = f64::from(placed.light.attenuation.range) * scene.space.scale;
-    // What is no range is none.
+    // A range that is not positive, or NaN, means no limit.
     if placed.light.kind == LightKind::Directional || range <= 0.0 || range.is_nan() {
         return false;
     }
@@ -75,12 +78,13 @@ fn is_out_of_range(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> bool
     scene.space.place(placed.position).distance(middle) > (range + reach) * (1.0 + f64::from(f32::EPSILON))
 }
 
-/// Of texels' sides, how near a light may be.
+/// The distance, in texel sides, from which on a light is not too near.
 const NEAR: f64 = 2.0;
-/// Coordinates of lights so far away that the edges of their shadows are rounded by a thousandth of a texel in maps of 8192.
-const AFAR: f64 = (1 << 14) as f64;
+/// Coordinates from which on a light is too far away: the edges of its shadows are rounded by a thousandth of a texel
+/// in maps of 8192.
+const FAR: f64 = (1 << 14) as f64;
 
-/// `None` where rays have to tell.
+/// The visibility of a light from an area; `None` if it needs shadow rays.
 fn visibility(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> Option<LightVisibility> {
     let light = &placed.light;
     let (shaft, origin) = match light.kind {
@@ -109,15 +113,15 @@ fn visibility(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> Option<Li
     let corners = |&index: &u32| scene.triangles[index as usize].corners.map(|corner| corner.as_dvec3());
     let shadows: Vec<Shadow> =
         blockers.iter().map(corners).filter_map(|corners: [DVec3; 3]| origin.shadow(corners)).collect();
-    let mut room = Pieces::new();
+    let mut scratch = Pieces::new();
     if shadows.is_empty() {
         Some(LightVisibility::Clear)
-    } else if origin.hides_all(area.corners, &shadows, &mut room) {
+    } else if origin.hides_all(area.corners, &shadows, &mut scratch) {
         Some(LightVisibility::Hidden)
     } else {
         Some(LightVisibility::Shadows(origin, shadows))
     }
 }
 
-/// Most triangles whose shadows are looked at for one light: beyond, rays are quicker.
+/// The most triangles whose shadows are cut out for one light; with more, shadow rays are faster.
 const MAX_BLOCKERS: usize = 128;

@@ -1,6 +1,7 @@
-//! Direct light of every covered texel. Sources that matter by themselves, in passes: a few shadow rays everywhere, many where the first pass,
-//! there or next to it, saw a source partly or differently, unless it was exact (a penumbra's faint ends are found by their neighbours),
-//! then more where the error asked for is not in sight. The other sources share samples: that is `shared_light`.
+//! Direct light of every covered texel. Sources that matter by themselves are sampled individually, in passes: a few
+//! shadow rays everywhere; many where the first pass saw a source partly, or saw other sources than a texel nearby,
+//! unless its result was exact (so the faint ends of a penumbra are found from their neighbours); then more where the
+//! requested error is not yet in reach. The other sources share samples: that is `shared_light`.
 
 pub(crate) mod light_cuts;
 pub(crate) mod light_visibility;
@@ -12,7 +13,7 @@ use glam::Vec3;
 
 use crate::chunks::{in_chunks, in_chunks_until_deadline};
 use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Texel, receiver};
+use crate::coverage::footprint::{Texel, open_texels, receiver};
 use crate::denoise::neighbourhoods::Neighbourhoods;
 use crate::direct_light::light_cuts::LightCuts;
 use crate::direct_light::local_light::LocalLight;
@@ -27,29 +28,30 @@ use crate::sources::light_sources::Sources;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions, BakeReport};
 
-/// How far a penumbra is suspected around a texel that saw one, in texels.
+/// How far around a texel that saw a penumbra others may be in it too, in texels.
 const REACH: u32 = 2;
 
-/// What arrives from lamps, lights and emissive surfaces without a bounce.
+/// Light that arrives from lamps, lights and emissive surfaces without a bounce.
 pub(crate) struct DirectLight {
     /// Per covered texel.
     pub texels: Vec<Direct>,
-    /// The light around each of them, beside which errors count.
+    /// The local light of each of them, relative to which errors count.
     pub local: LocalLight,
 }
 
 impl DirectLight {
-    /// Per texel of all maps, irradiance (mixed lights included); NaN where nothing is shown.
+    /// Irradiance (mixed lights included) per texel of all maps; NaN where no surface is in the open.
     pub fn by_place(&self, texels: &CoveredTexels<'_>) -> Vec<Vec3> {
         let mut total = vec![Vec3::NAN; texels.layout.texels];
-        for (texel, direct) in texels.list.iter().zip(&self.texels).filter(|(texel, _)| !texel.is_hidden()) {
-            total[texel.index.place()] = direct.total();
+        for (covered, texel) in open_texels(&texels.list) {
+            total[texel.index.place()] = self.texels[covered.place()].total();
         }
         total
     }
 }
 
-/// Direct light of every covered texel, and the light around it. What is `known` of a former bake stays as it is; an empty list knows nothing.
+/// Computes the direct light of every covered texel, and the local light around it. Texels that are `known` from a
+/// previous bake keep their light; an empty list means that none is known.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -61,129 +63,247 @@ pub(crate) fn direct_light(
     monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<DirectLight, BakeError> {
-    let scene = sources.scene;
-    let CoveredTexels { layout, list: texels, charts, .. } = texels;
-    let known = |texel: CoveredTexel| known.get(texel.place()).copied().flatten();
-    let [few, many, most] = options.effort().direct;
-    let mut cuts = monitor.run_interruptible(1.0, || LightCuts::new(sources, texels, charts))?;
-    let wanted = |texel: CoveredTexel| known(texel).is_none();
-    let shafts = monitor.run_interruptible(1.0, || Shafts::new(scene, sources, texels, &cuts, wanted))?;
-    // Where rays would have to tell, one to any of the sources tells as much as one to each.
-    cuts.share(sources, &shafts.unresolved(&cuts));
-    let cuts = cuts;
-    let light = |own: CoveredTexel, samples: u32| {
-        let (place, texel) = (own.place(), &texels[own.place()]);
+    let sampler = SourceSampler::new(sources, texels, known, options, monitor)?;
+    let mut direct = sampler.first_pass(monitor)?;
+    let shared = sampler.shared_light(monitor)?;
+    let so_far = shared.as_ref().map(|shared| shared.with(&direct));
+    monitor.pass(PASS_OF_LOCAL_LIGHT);
+    let local = LocalLight::new(sources, texels, so_far.as_ref().unwrap_or(&direct), monitor)?;
+    let goals = ErrorGoals::new(sources, texels, options, shared.is_some());
+    let doubtful = sampler.resample_doubtful(&mut direct, monitor)?;
+    sampler.refine(&doubtful, &mut direct, &local, goals.individual, monitor)?;
+    if let Some(shared) = shared {
+        let left = sum(&relative_variances(&direct, &local));
+        let goal = |share: f64| goals.of_shared(share, left);
+        let share = |samples: f64| goals.share_for(samples);
+        shared.finish(&mut direct, &local, (share(0.0), &share), &goal, monitor)?;
+    }
+    let rays = sampler.unknown().map(|texel| u64::from(direct[texel.place()].rays));
+    report.rays += rays.sum::<u64>();
+    Ok(DirectLight { texels: direct, local })
+}
+
+/// Samples the direct light of the texels that are not known from a previous bake, with everything that all passes
+/// need.
+struct SourceSampler<'a> {
+    sources: &'a Sources<'a>,
+    texels: &'a CoveredTexels<'a>,
+    known: &'a [Option<Direct>],
+    options: &'a BakeOptions,
+    cuts: LightCuts,
+    shafts: Shafts<'a>,
+}
+
+impl<'a> SourceSampler<'a> {
+    fn new(
+        sources: &'a Sources<'a>,
+        texels: &'a CoveredTexels<'a>,
+        known: &'a [Option<Direct>],
+        options: &'a BakeOptions,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<Self, BakeError> {
+        let list = &texels.list;
+        let mut cuts = monitor.run_interruptible(1.0, || LightCuts::new(sources, list, &texels.charts))?;
+        let is_wanted = |texel: CoveredTexel| known_light(known, texel).is_none();
+        let shafts =
+            monitor.run_interruptible(1.0, || Shafts::new(sources.scene, sources, list, &cuts, is_wanted))?;
+        // Where shadow rays would be needed anyway, one ray to any of the sources is worth as much as one to each of
+        // them.
+        cuts.share(sources, &shafts.unresolved(&cuts));
+        Ok(Self { sources, texels, known, options, cuts, shafts })
+    }
+
+    fn is_wanted(&self, texel: CoveredTexel) -> bool {
+        known_light(self.known, texel).is_none()
+    }
+
+    /// The texels whose light is not known from a previous bake.
+    fn unknown(&self) -> impl Iterator<Item = CoveredTexel> {
+        CoveredTexel::all(self.texels.list.len()).filter(|&texel| self.is_wanted(texel))
+    }
+
+    /// The light of the individually sampled sources at a texel, by so many samples of each.
+    fn light(&self, covered: CoveredTexel, samples: u32) -> Direct {
+        let texel = &self.texels.list[covered.place()];
         if texel.is_hidden() {
             return Direct::default();
         }
-        let sequence = Sequence::new(options.seed, Stream::DirectLight, texel.index.0);
-        sources.irradiance_per_source(
-            cuts.of(place),
-            &shafts.visibility(place, texel),
+        let sequence = Sequence::new(self.options.seed, Stream::DirectLight, texel.index.0);
+        let scene = self.sources.scene;
+        self.sources.irradiance_per_source(
+            self.cuts.of(covered.place()),
+            &self.shafts.visibility(covered.place(), texel),
             sequence,
             samples,
             &|x, y| texel.point(scene, x, y).map(|point| receiver(scene, &point)),
         )
-    };
-    // A complete map first, whatever time it takes.
-    let clock = monitor.clock();
-    monitor.pass(PASS);
-    let unknown: Vec<CoveredTexel> = CoveredTexel::all(texels.len()).filter(|&texel| wanted(texel)).collect();
-    let found = in_chunks(unknown.len(), monitor, |place| {
-        light(unknown[place], if clock.is_over() { few.min(LATE) } else { few })
-    })?;
-    let mut direct: Vec<Direct> =
-        CoveredTexel::all(texels.len()).map(|texel| known(texel).unwrap_or_default()).collect();
-    for (texel, found) in unknown.iter().zip(found) {
-        direct[texel.place()] = found;
     }
-    let shared = match cuts.share_samples() {
-        true => {
-            let wanted = |place: usize| wanted(CoveredTexel::new(place));
-            // What is known has no samples that others could be compared with.
-            let keys = cuts.keys().into_iter().enumerate();
-            let groups: Vec<u32> = keys.map(|(place, key)| 2 * key + u32::from(wanted(place))).collect();
-            let neighbourhoods = Neighbourhoods::new(scene, layout, texels, charts, &groups);
-            monitor.pass(PASS);
-            Some(SharedLight::new(sources, neighbourhoods, &cuts, wanted, options, monitor)?)
-        }
-        false => None,
-    };
-    monitor.pass(PASS_OF_LOCAL_LIGHT);
-    let so_far = shared.as_ref().map(|shared| shared.with(&direct));
-    let local = so_far.as_ref().unwrap_or(&direct);
-    let local = LocalLight::new(sources, layout, texels, charts, local, monitor)?;
-    let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
-    let asked = open * options.error.powi(2);
-    // Shared samples are mostly cheaper than rays of the gather, so that direct light is held to a smaller share of the error.
-    let gathers = scene.surfaces.iter().any(|surface| !surface.is_black());
-    let share = if shared.is_some() && gathers { SHARED_SHARE } else { OWN_SHARE };
-    let own_goal = asked * if shared.is_some() { 0.5 * share } else { share };
 
-    let mut again = in_doubt(layout, texels, &direct);
-    again.retain(|&texel| wanted(texel) && direct[texel.place()].sampled);
-    monitor.pass(PASS);
-    let better = in_chunks_until_deadline(again.len(), monitor, |place| light(again[place], many))?;
-    replace(&mut direct, &again, better);
-    // Then more where the error asked for is not in sight yet, in the shadows' edges mostly.
-    let mut samples = vec![many; texels.len()];
-    loop {
-        let relative = relative(&direct, &local);
-        if sum(&relative) <= own_goal {
-            break;
-        }
-        let wanted = allocate(again.iter().copied(), &relative, &samples, most, ORDER, own_goal);
+    /// Known light, and a few samples of every other texel: a complete map, whatever time it takes.
+    fn first_pass(&self, monitor: &mut BakeMonitor<'_>) -> Result<Vec<Direct>, BakeError> {
+        let [few, ..] = self.options.effort().direct;
+        let clock = monitor.clock();
         monitor.pass(PASS);
-        let better = in_chunks_until_deadline(wanted.len(), monitor, |place| {
-            light(wanted[place].texel, wanted[place].samples)
+        let unknown: Vec<CoveredTexel> = self.unknown().collect();
+        let sampled = in_chunks(unknown.len(), monitor, |place| {
+            self.light(unknown[place], if clock.is_over() { few.min(LATE_SAMPLES) } else { few })
         })?;
-        if better.is_empty() {
-            break;
+        let mut direct: Vec<Direct> = CoveredTexel::all(self.texels.list.len())
+            .map(|texel| known_light(self.known, texel).unwrap_or_default())
+            .collect();
+        for (texel, light) in unknown.iter().zip(sampled) {
+            direct[texel.place()] = light;
         }
-        for wanted in &wanted {
-            samples[wanted.texel.place()] = wanted.samples;
+        Ok(direct)
+    }
+
+    /// The first round of the sources that share samples; `None` if there are none.
+    fn shared_light(&self, monitor: &mut BakeMonitor<'_>) -> Result<Option<SharedLight<'_>>, BakeError> {
+        if !self.cuts.share_samples() {
+            return Ok(None);
         }
-        let again: Vec<CoveredTexel> = wanted.iter().map(|wanted| wanted.texel).collect();
-        replace(&mut direct, &again, better);
+        let CoveredTexels { layout, list, charts, .. } = self.texels;
+        let is_wanted = |place: usize| self.is_wanted(CoveredTexel::new(place));
+        // Texels with known light have no shared samples, so the others must not be compared with them.
+        let keys = self.cuts.keys().into_iter().enumerate();
+        let groups: Vec<u32> = keys.map(|(place, key)| 2 * key + u32::from(is_wanted(place))).collect();
+        let neighbourhoods = Neighbourhoods::new(self.sources.scene, layout, list, charts, &groups);
+        monitor.pass(PASS);
+        let shared =
+            SharedLight::new(self.sources, neighbourhoods, &self.cuts, is_wanted, self.options, monitor)?;
+        Ok(Some(shared))
     }
-    if let Some(shared) = shared {
-        let own = sum(&relative(&direct, &local));
-        let goal = |share: f64| (asked * share - own).max(own_goal);
-        let share = |samples: f64| if gathers { share_beside_gather(samples) } else { share };
-        shared.finish(&mut direct, &local, (share(0.0), &share), &goal, monitor)?;
+
+    /// Samples texels in or near penumbras with many samples, as far as there is time; returns those texels.
+    fn resample_doubtful(
+        &self,
+        direct: &mut [Direct],
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<Vec<CoveredTexel>, BakeError> {
+        let [_, many, _] = self.options.effort().direct;
+        let mut doubtful = doubtful_texels(self.texels.layout, &self.texels.list, direct);
+        doubtful.retain(|&texel| self.is_wanted(texel) && direct[texel.place()].sampled);
+        monitor.pass(PASS);
+        let better =
+            in_chunks_until_deadline(doubtful.len(), monitor, |place| self.light(doubtful[place], many))?;
+        replace_first(direct, &doubtful, better);
+        Ok(doubtful)
     }
-    let new = unknown.iter().map(|texel| u64::from(direct[texel.place()].rays));
-    report.rays += new.sum::<u64>();
-    Ok(DirectLight { texels: direct, local })
+
+    /// Takes more samples of doubtful texels, mostly at the edges of shadows, until the sum of squared errors is down
+    /// to `goal`, no texel can have more, or the time is up.
+    fn refine(
+        &self,
+        doubtful: &[CoveredTexel],
+        direct: &mut [Direct],
+        local: &LocalLight,
+        goal: f64,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<(), BakeError> {
+        let [_, many, most] = self.options.effort().direct;
+        let mut samples = vec![many; self.texels.list.len()];
+        loop {
+            let variances = relative_variances(direct, local);
+            if sum(&variances) <= goal {
+                return Ok(());
+            }
+            let allocated = allocate(doubtful.iter().copied(), &variances, &samples, most, ORDER, goal);
+            monitor.pass(PASS);
+            let better = in_chunks_until_deadline(allocated.len(), monitor, |index| {
+                self.light(allocated[index].texel, allocated[index].samples)
+            })?;
+            if better.is_empty() {
+                return Ok(());
+            }
+            for allocation in &allocated {
+                samples[allocation.texel.place()] = allocation.samples;
+            }
+            let texels: Vec<CoveredTexel> = allocated.iter().map(|allocation| allocation.texel).collect();
+            replace_first(direct, &texels, better);
+        }
+    }
 }
 
-/// Of the squared error asked for, what direct light may have for itself.
-const OWN_SHARE: f64 = 0.35;
-/// The same where sources share samples, and a gather follows, at least and at most.
-const SHARED_SHARE: f64 = 0.2;
+/// The light of a texel from a previous bake.
+fn known_light(known: &[Option<Direct>], texel: CoveredTexel) -> Option<Direct> {
+    known.get(texel.place()).copied().flatten()
+}
+
+/// What direct light may leave of the requested error, as sums over all texels of squared errors relative to the local
+/// light.
+struct ErrorGoals {
+    /// The sum that is requested for the whole bake.
+    total: f64,
+    /// The least share of it for direct light.
+    share: f64,
+    /// The sum that individually sampled sources may leave.
+    individual: f64,
+    /// Whether light bounces, so that a final gather follows.
+    has_gather: bool,
+}
+
+impl ErrorGoals {
+    fn new(
+        sources: &Sources<'_>,
+        texels: &CoveredTexels<'_>,
+        options: &BakeOptions,
+        has_shared: bool,
+    ) -> Self {
+        let open = open_texels(&texels.list).count().max(1) as f64;
+        let total = open * options.error.powi(2);
+        let has_gather = sources.scene.surfaces.iter().any(|surface| !surface.is_black());
+        // Shared samples are mostly cheaper than rays of the gather, so that direct light is held to a smaller share of
+        // the error.
+        let share = if has_shared && has_gather { MIN_SHARED_SHARE } else { INDIVIDUAL_SHARE };
+        let individual = total * if has_shared { 0.5 * share } else { share };
+        Self { total, share, individual, has_gather }
+    }
+
+    /// What sources that share samples may leave if direct light has this share of the total, and the individually
+    /// sampled ones leave `left`.
+    fn of_shared(&self, share: f64, left: f64) -> f64 {
+        (self.total * share - left).max(self.individual)
+    }
+
+    /// The share of the total for direct light if shared sources need so many samples per texel to reach the least
+    /// share.
+    fn share_for(&self, samples: f64) -> f64 {
+        if self.has_gather { share_beside_gather(samples) } else { self.share }
+    }
+}
+
+/// The share of the requested squared error that direct light may leave where all sources are sampled individually.
+const INDIVIDUAL_SHARE: f64 = 0.35;
+/// Its least and greatest value where sources share samples and a gather follows.
+const MIN_SHARED_SHARE: f64 = 0.2;
 const MAX_SHARED_SHARE: f64 = 0.5;
-/// What direct light and the gather may leave together.
-const BOTH: f64 = 0.85;
-/// What a gather takes: its rays for each texel times the share of the squared error that they leave. From 7 in a room to 30 in the demo level.
-const GATHER: f64 = 30.0;
+/// The share that direct light and the gather may leave together.
+const BOTH_SHARE: f64 = 0.85;
+/// Cost of the gather: its rays per texel times the share of the squared error that they leave. From 7 in a room to 30
+/// in the demo level.
+const GATHER_COST: f64 = 30.0;
 
-/// The share of the squared error asked for that sources may leave which take so many samples for each texel to leave the least share: as noise falls
-/// with the samples, both take the fewest together where their shares are as the roots of what each takes.
+/// The share of the requested squared error for direct light, whose shared sources need so many samples per texel to
+/// reach
+/// [`MIN_SHARED_SHARE`]. As variance is inversely proportional to the samples, direct light and the gather take the
+/// fewest samples together if their shares are in proportion to the square roots of their costs.
 fn share_beside_gather(samples: f64) -> f64 {
-    let (own, gather) = ((samples * SHARED_SHARE).sqrt(), GATHER.sqrt());
-    (BOTH * own / (own + gather)).clamp(SHARED_SHARE, MAX_SHARED_SHARE)
+    let (direct, gather) = ((samples * MIN_SHARED_SHARE).sqrt(), GATHER_COST.sqrt());
+    (BOTH_SHARE * direct / (direct + gather)).clamp(MIN_SHARED_SHARE, MAX_SHARED_SHARE)
 }
-/// Order of the variance's fall with the samples at straight edges of shadows, as measured.
+
+/// The power of the number of samples with which the variance falls at straight edges of shadows, as measured.
 const ORDER: f64 = 1.5;
 
-/// A pass's usual share of the time that this one and those after it take.
+/// A pass's usual share of the time that it and the passes after it take.
 const PASS: f32 = 0.5;
 const PASS_OF_LOCAL_LIGHT: f32 = 0.2;
 
-/// Shadow rays of a texel when the time is up: their spread still tells the error.
-const LATE: u32 = 4;
-/// The variances as they are expected, in shares of the squared light around.
-fn relative(direct: &[Direct], local: &LocalLight) -> Vec<f32> {
+/// Shadow rays of a texel once the time is up: still enough to estimate the error from their spread.
+const LATE_SAMPLES: u32 = 4;
+
+/// The expected variances relative to the squared local light.
+fn relative_variances(direct: &[Direct], local: &LocalLight) -> Vec<f32> {
     let variances: Vec<f32> = direct.iter().map(|direct| direct.variance - direct.caution).collect();
     local.relative(&variances)
 }
@@ -192,29 +312,27 @@ fn sum(numbers: &[f32]) -> f64 {
     numbers.iter().map(|&number| f64::from(number)).sum()
 }
 
-/// Those that there was time for.
-fn replace(direct: &mut [Direct], at: &[CoveredTexel], better: Vec<Direct>) {
-    for (texel, better) in at.iter().zip(better) {
-        let first = &mut direct[texel.place()];
-        *first = Direct { rays: first.rays + better.rays, ..better };
+/// Replaces the light of the first texels of a list, for which there was time; their rays add up.
+fn replace_first(direct: &mut [Direct], texels: &[CoveredTexel], better: Vec<Direct>) {
+    for (texel, better) in texels.iter().zip(better) {
+        let light = &mut direct[texel.place()];
+        *light = Direct { rays: light.rays + better.rays, ..better };
     }
 }
 
-/// Texels that saw a source partly, or near one that did, or next to one that saw other sources.
-fn in_doubt(layout: &LightmapLayout, texels: &[Texel], direct: &[Direct]) -> Vec<CoveredTexel> {
-    let mut seen: Vec<Option<VisibilitySummary>> = vec![None; layout.texels];
-    for (texel, direct) in texels.iter().zip(direct).filter(|(texel, _)| !texel.is_hidden()) {
-        seen[texel.index.place()] = Some(direct.seen);
+/// Texels that have, within [`REACH`], a texel (perhaps themselves) that saw a source partly, or one that saw other
+/// sources than they did.
+fn doubtful_texels(layout: &LightmapLayout, texels: &[Texel], direct: &[Direct]) -> Vec<CoveredTexel> {
+    let mut summaries: Vec<Option<VisibilitySummary>> = vec![None; layout.texels];
+    for (covered, texel) in open_texels(texels) {
+        summaries[texel.index.place()] = Some(direct[covered.place()].seen);
     }
-    let doubtful = |texel: &Texel| {
-        let Some(own) = seen[texel.index.place()] else { return false };
+    let is_doubtful = |texel: &Texel| {
+        let Some(summary) = summaries[texel.index.place()] else { return false };
         let map = &layout.maps[texel.object as usize];
-        let rows = texel.y.saturating_sub(REACH)..=(texel.y + REACH).min(map.height - 1);
-        let columns = texel.x.saturating_sub(REACH)..=(texel.x + REACH).min(map.width - 1);
-        rows.flat_map(|y| columns.clone().map(move |x| (x, y))).any(|(x, y)| {
-            seen[map.texel(x, y).place()]
-                .is_some_and(|other| other.partly || other.signature != own.signature)
+        map.neighbourhood(texel.x, texel.y, REACH).any(|near| {
+            summaries[near.place()].is_some_and(|other| other.partly || other.signature != summary.signature)
         })
     };
-    CoveredTexel::all(texels.len()).filter(|own| doubtful(&texels[own.place()])).collect()
+    CoveredTexel::all(texels.len()).filter(|covered| is_doubtful(&texels[covered.place()])).collect()
 }

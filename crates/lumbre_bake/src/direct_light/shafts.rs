@@ -1,5 +1,6 @@
-//! What may stand between texels and what shines on them: found for tiles of texels, and narrowed down for each. Where it is little, direct
-//! light needs no shadow ray. Not the light: that is `direct`.
+//! The triangles that may occlude the sources of light from texels: collected for tiles of texels by shafts, and
+//! narrowed down for each texel. Where they are few, direct light is computed without shadow rays. The light itself is
+//! in `sources`.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +10,8 @@ use rayon::prelude::*;
 use super::light_cuts::LightCuts;
 use super::light_visibility::visibilities;
 use crate::coverage::footprint::{Footprint, FootprintPoint, GRID, Texel, barycentric};
-use crate::coverage::tiles::{Tiles, area, positions_of, shows_plane};
+use crate::coverage::texel_geometry::{bounding_area, positions_of, shows_plane};
+use crate::coverage::texel_groups::TexelGroups;
 use crate::scene::BakeScene;
 use crate::sources::light_cut::LightCut;
 use crate::sources::light_sources::Sources;
@@ -18,23 +20,25 @@ use crate::visibility::occluders::{LampOccluders, Visibility};
 use crate::visibility::shadow_clipping::{LightVisibility, ReceiverShape};
 use crate::visibility::shaft::{Area, Shaft};
 
-/// What may stand between a tile and the sources.
+/// What may occlude the sources from a tile.
 #[derive(Default)]
 struct TileOccluders {
     lamps: Vec<TileLampOccluders>,
-    /// By the lights' numbers.
+    /// By the lights' indices, ascending.
     lights: Vec<(u32, LightVisibility)>,
-    /// A texel of it, by its place, that shows something: none if nobody wants to know.
-    asked: Option<u32>,
+    /// The index of a texel of the tile that is in the open; `None` if there is none, or if no texel of the tile is
+    /// wanted.
+    open_texel: Option<u32>,
 }
 
-/// What may stand between a tile and a part of the emissive surfaces, by numbers.
+/// What may occlude a lamp, a node of the emitter tree, from a tile.
 struct TileLampOccluders {
     node: u32,
+    /// The emitters that may shine on the tile, each with the triangles that may occlude it.
     emitters: Vec<(u32, Vec<u32>)>,
 }
 
-/// What may stand between texels and the sources.
+/// What may occlude the sources from each texel.
 pub(crate) struct Shafts<'a> {
     scene: &'a BakeScene,
     sources: &'a Sources<'a>,
@@ -44,7 +48,7 @@ pub(crate) struct Shafts<'a> {
 }
 
 impl<'a> Shafts<'a> {
-    /// For all covered texels; tiles of which none is wanted are left out.
+    /// Collects the occluders for all tiles of covered texels with a texel that is wanted.
     pub fn new(
         scene: &'a BakeScene,
         sources: &'a Sources<'a>,
@@ -56,31 +60,31 @@ impl<'a> Shafts<'a> {
         if sources.emitters.is_empty() && sources.lights.is_empty() {
             return shafts;
         }
-        let Tiles { members, tile_of } = Tiles::new(texels);
-        shafts.tile_of = tile_of;
+        let TexelGroups { members, group_of } = TexelGroups::tiles(texels);
+        shafts.tile_of = group_of;
         shafts.tiles = members
             .par_iter()
             .map(|members| {
-                if scene.stop.is_cancelled() || !members.iter().any(|&place| wanted(CoveredTexel(place))) {
+                if scene.stop.is_cancelled() || !members.iter().any(|&texel| wanted(CoveredTexel(texel))) {
                     return TileOccluders::default();
                 }
                 let cut = cuts.of(members[0] as usize);
-                let asked = members.iter().copied().find(|&place| !texels[place as usize].is_hidden());
-                let members = || members.iter().map(|&place| &texels[place as usize]);
-                let found = shafts.tile_occluders(cut, members).unwrap_or_default();
-                TileOccluders { asked, ..found }
+                let open_texel = members.iter().copied().find(|&texel| !texels[texel as usize].is_hidden());
+                let members = || members.iter().map(|&texel| &texels[texel as usize]);
+                let occluders = shafts.tile_occluders(cut, members).unwrap_or_default();
+                TileOccluders { open_texel, ..occluders }
             })
             .collect();
         shafts
     }
 
-    /// From an area to an emitter; `None` where no light passes.
+    /// The shaft from an area to an emitter; `None` if the emitter does not shine on the area.
     fn shaft(&self, area: &Area, emitter: u32) -> Option<Shaft> {
         let emitter = &self.sources.emitters[emitter as usize];
         Shaft::new(area, emitter.corners_f64, emitter.normal)
     }
 
-    /// `None` where rays have to tell.
+    /// The occluders of a tile; `None` if its texels need shadow rays to every source.
     fn tile_occluders<'t, T: Iterator<Item = &'t Texel>>(
         &self,
         cut: &LightCut,
@@ -90,73 +94,75 @@ impl<'a> Shafts<'a> {
         let first = open.next()?;
         let mut positions = Vec::new();
         members().for_each(|texel| positions_of(self.scene, texel, &mut positions));
-        let area = area(self.scene, first.triangle, &positions)?;
+        let area = bounding_area(self.scene, first.triangle, &positions)?;
         if !members().all(|texel| shows_plane(self.scene, texel, first.triangle)) {
             return None;
         }
         let lamp = |&node: &u32| {
-            let emitters = self.sources.emitters_of(node);
-            if emitters.len() > MAX_EMITTERS {
+            let all_emitters = self.sources.emitters_of(node);
+            if all_emitters.len() > MAX_EMITTERS {
                 return None;
             }
-            let mut found = Vec::new();
-            for &emitter in emitters {
+            let mut emitters = Vec::new();
+            for &emitter in all_emitters {
                 if self.scene.stop.is_cancelled() {
                     return None;
                 }
                 if let Some(shaft) = self.shaft(&area, emitter) {
-                    found.push((emitter, shaft.triangles(self.scene, MAX_BLOCKERS)?));
+                    emitters.push((emitter, shaft.triangles(self.scene, MAX_BLOCKERS)?));
                 }
             }
-            Some(TileLampOccluders { node, emitters: found })
+            Some(TileLampOccluders { node, emitters })
         };
         let lamps = cut.lamps.iter().filter_map(lamp).collect();
         let lights = visibilities(self.sources, &cut.lights, &area, first.side(self.scene));
-        Some(TileOccluders { lamps, lights, asked: None })
+        Some(TileOccluders { lamps, lights, open_texel: None })
     }
 
-    /// Lamps that have samples of their own in blocks in most of whose tiles it is not known what may stand before them: a texel of the block,
-    /// by its place, and the lamp.
+    /// Lamps that have samples of their own in a block, but whose occluders are unknown in most of the block's tiles:
+    /// pairs of a texel's index, which stands for its block, and the lamp.
     pub fn unresolved(&self, cuts: &LightCuts) -> Vec<(u32, u32)> {
-        // Of each block its tiles, and of each lamp there those that leave it open.
+        // The number of tiles in each block; and for each block and lamp a texel and the number of tiles that do not
+        // know the lamp's occluders.
         let mut tiles: BTreeMap<u32, u32> = BTreeMap::new();
-        let mut open: BTreeMap<(u32, u32), (u32, u32)> = BTreeMap::new();
-        for (tile, asked) in self.tiles.iter().filter_map(|tile| Some((tile, tile.asked?))) {
-            let block = cuts.block(asked as usize);
+        let mut unresolved: BTreeMap<(u32, u32), (u32, u32)> = BTreeMap::new();
+        for (tile, texel) in self.tiles.iter().filter_map(|tile| Some((tile, tile.open_texel?))) {
+            let block = cuts.block(texel as usize);
             *tiles.entry(block).or_default() += 1;
-            // Where all lamps have samples of their own the sum over them is exact, and only what is hidden of it is left to rays.
-            let cut = cuts.of(asked as usize);
+            // Where all lamps have samples of their own, the unoccluded sum over them is exact and rays only find the
+            // visible share of it.
+            let cut = cuts.of(texel as usize);
             for &lamp in cut.lamps.iter().filter(|_| !cut.all_apart) {
                 if tile.lamps.iter().all(|occluders| occluders.node != lamp) {
-                    open.entry((block, lamp)).or_insert((asked, 0)).1 += 1;
+                    unresolved.entry((block, lamp)).or_insert((texel, 0)).1 += 1;
                 }
             }
         }
-        let most = |((block, lamp), (asked, count)): ((u32, u32), (u32, u32))| {
-            (2 * count > tiles[&block]).then_some((asked, lamp))
+        let in_most_tiles = |((block, lamp), (texel, count)): ((u32, u32), (u32, u32))| {
+            (2 * count > tiles[&block]).then_some((texel, lamp))
         };
-        open.into_iter().filter_map(most).collect()
+        unresolved.into_iter().filter_map(in_most_tiles).collect()
     }
 
-    /// What may stand between a texel, by its number, and those of the sources for which that is known.
+    /// What may occlude the sources from a texel, as far as that is known; `place` is the texel's index.
     pub fn visibility(&self, place: usize, texel: &Texel) -> Visibility<'_> {
-        // Asked for by lights alone.
+        // Only punctual lights use the square.
         let square = if self.sources.lights.is_empty() { None } else { square(self.scene, texel) };
         let Some(&tile) = self.tile_of.get(place) else {
             return Visibility { square, ..Visibility::UNKNOWN };
         };
         let tile = &self.tiles[tile as usize];
-        let (mut own, mut positions) = (None, Vec::new());
-        let one = |tile_lamp: &TileLampOccluders| {
+        let (mut texel_area, mut positions) = (None, Vec::new());
+        let narrow_lamp = |tile_lamp: &TileLampOccluders| {
             if tile_lamp.emitters.iter().all(|(_, blockers)| blockers.is_empty()) {
                 return Some(LampOccluders { node: tile_lamp.node, emitters: Vec::new() });
             }
-            if own.is_none() {
+            if texel_area.is_none() {
                 positions_of(self.scene, texel, &mut positions);
-                own = area(self.scene, texel.triangle, &positions);
+                texel_area = bounding_area(self.scene, texel.triangle, &positions);
             }
-            let area = own?;
-            let narrowed = |(emitter, blockers): &(u32, Vec<u32>)| {
+            let area = texel_area?;
+            let narrow_emitter = |(emitter, blockers): &(u32, Vec<u32>)| {
                 let shaft = self.shaft(&area, *emitter)?;
                 let corners = blockers.iter().filter_map(|&index| {
                     let triangle = &self.scene.triangles[index as usize];
@@ -165,11 +171,14 @@ impl<'a> Shafts<'a> {
                 });
                 Some((*emitter, corners.collect()))
             };
-            let emitters: Vec<(u32, Vec<_>)> = tile_lamp.emitters.iter().filter_map(narrowed).collect();
-            let clear = emitters.iter().all(|(_, blockers)| blockers.is_empty());
-            Some(LampOccluders { node: tile_lamp.node, emitters: if clear { Vec::new() } else { emitters } })
+            let emitters: Vec<(u32, Vec<_>)> = tile_lamp.emitters.iter().filter_map(narrow_emitter).collect();
+            let is_clear = emitters.iter().all(|(_, blockers)| blockers.is_empty());
+            Some(LampOccluders {
+                node: tile_lamp.node,
+                emitters: if is_clear { Vec::new() } else { emitters },
+            })
         };
-        let lamps = tile.lamps.iter().filter_map(one).collect();
+        let lamps = tile.lamps.iter().filter_map(narrow_lamp).collect();
         let in_shadow =
             tile.lights.iter().any(|(_, visibility)| matches!(visibility, LightVisibility::Shadows(..)));
         Visibility {
@@ -181,7 +190,7 @@ impl<'a> Shafts<'a> {
     }
 }
 
-/// What a texel on a plane shows of it.
+/// The shape of what a texel of a flat tile shows.
 fn receiver_shape(scene: &BakeScene, texel: &Texel) -> ReceiverShape {
     let mut positions = Vec::new();
     positions_of(scene, texel, &mut positions);
@@ -192,31 +201,31 @@ fn receiver_shape(scene: &BakeScene, texel: &Texel) -> ReceiverShape {
     }
 }
 
-/// Of the distance that two corners of a texel have, how far its points may lie from the square of its triangle.
+/// How far a texel's points may lie from the plane square of its triangle, as a share of the square's diagonal.
 const FLAT: f32 = 1e-3;
 
-/// The corners of a texel whose square is filled by one triangle, or by several as if they were one.
+/// The corners of a texel, on the surface, if one triangle fills its square, or several do that lie in one plane.
 fn square(scene: &BakeScene, texel: &Texel) -> Option<[DVec3; 4]> {
     let triangle = &scene.triangles[texel.triangle as usize];
     let corner = Vec2::new(texel.x as f32, texel.y as f32);
     let place = |offset: Vec2| barycentric(triangle, corner + offset).map(|(u, v)| triangle.position(u, v));
     let corners = [place(Vec2::ZERO)?, place(Vec2::X)?, place(Vec2::ONE)?, place(Vec2::Y)?];
-    let near = FLAT * corners[0].distance(corners[2]);
-    let fills = match &texel.footprint {
+    let tolerance = FLAT * corners[0].distance(corners[2]);
+    let is_filled = match &texel.footprint {
         Footprint::Whole(_) => true,
         Footprint::Points(points) => {
             let on_square = |point: &FootprintPoint| {
                 let (u, v) = point.at;
-                let found = scene.triangles[point.triangle as usize].position(u, v);
-                place(point.offset).is_some_and(|place| place.distance(found) <= near)
+                let position = scene.triangles[point.triangle as usize].position(u, v);
+                place(point.offset).is_some_and(|place| place.distance(position) <= tolerance)
             };
             points.len() == GRID && points.iter().all(on_square)
         }
         Footprint::Hidden => false,
     };
-    fills.then(|| corners.map(|corner| corner.as_dvec3()))
+    is_filled.then(|| corners.map(|corner| corner.as_dvec3()))
 }
 
-/// Most triangles that may stand before an emitter, and most emitters of a lamp: beyond, rays are quicker.
+/// The most triangles that may occlude an emitter, and the most emitters of a lamp; with more, shadow rays are faster.
 const MAX_BLOCKERS: usize = 32;
 const MAX_EMITTERS: usize = 8;

@@ -1,6 +1,7 @@
-//! Direct light of the sources that share samples, of every covered texel: a few samples everywhere, smoothed over neighbours that have the
-//! same light cut, then more where they are worth most, until what direct light may leave of the error asked for is reached. Not the
-//! samples: those are `shared_samples`'; not the sources that have samples of their own: those are `lighting`'s.
+//! Direct light of the sources that share samples, for every covered texel: a few samples everywhere, smoothed over
+//! neighbours that have the same light cut, then more where they are worth most, until direct light leaves no more than
+//! its share of the requested error. Single samples are taken in `sources::shared_samples`; individually sampled
+//! sources are the parent module's.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -12,8 +13,7 @@ use crate::chunks::{in_chunks, in_chunks_until_deadline};
 use crate::coverage::footprint::{Texel, receiver};
 use crate::coverage::tile_sequence::TileSequence;
 use crate::denoise::neighbourhoods::Neighbourhoods;
-use crate::denoise::replicates::spread;
-use crate::denoise::replicates::{Estimates, REPLICATES, mean};
+use crate::denoise::replicates::{Estimates, REPLICATES, mean, spread};
 use crate::denoise::smooth::smooth;
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::{SampleAllocation, allocate_within};
@@ -24,14 +24,14 @@ use crate::sources::light_sources::Sources;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions};
 
-/// What a texel has found.
+/// The sums of a texel's samples.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Shared {
-    /// Sum of the samples of each replicate, of what is baked.
+pub(crate) struct SampleSums {
+    /// Baked light: the sum of the samples of each replicate.
     pub sums: [Vec3; REPLICATES],
-    /// Sum of all samples, of mixed lights.
+    /// Light of mixed lights: the sum of all samples.
     pub mixed: Vec3,
-    /// Sum of 1 / distance to what was asked, canonical units.
+    /// Sum of 1 / distance to the sampled points of sources, canonical units.
     pub inverse_distances: f32,
     /// Samples of each replicate.
     pub samples: u32,
@@ -39,18 +39,21 @@ pub(crate) struct Shared {
     pub rays: u32,
 }
 
-/// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
+/// The power of the number of samples with which the variance falls: between random samples (1) and a Sobol sequence on
+/// a smooth integrand (3).
 const ORDER: f64 = 1.25;
-/// The most by which a round lowers what is left: the first estimates are rough, and a goal out of reach would take all that can be had.
-const MAX_OF_A_ROUND: f64 = 8.0;
-/// A round that leaves more than this of the squared error was the last, and one that leaves so many times what was asked: to smooth
-/// everything once more takes longer than what is left is worth.
+/// The most by which a round aims to lower the sum of squared errors: the first estimates are rough, and a goal out of
+/// reach would take all samples that can be had.
+const MAX_REDUCTION: f64 = 8.0;
+/// A round that leaves more than this share of the squared error is the last.
 const STALLED: f64 = 0.9;
+/// So is a round that leaves less than this multiple of the goal: smoothing everything once more would cost more than
+/// the rest is worth.
 const ENOUGH: f64 = 1.15;
-/// A round's usual share of the time that this one and those after it take.
+/// A round's usual share of the time that it and the rounds after it take.
 const PASS: f32 = 0.6;
 
-impl Shared {
+impl SampleSums {
     fn estimates(&self) -> Estimates {
         self.sums.map(|sum| sum / self.samples.max(1) as f32)
     }
@@ -59,7 +62,7 @@ impl Shared {
         self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
     }
 
-    /// Adds samples up to `samples` of each replicate.
+    /// Adds samples until each replicate has `samples`; `run` is the first run's length of a [`TileSequence`].
     fn add(
         &mut self,
         sources: &Sources<'_>,
@@ -76,32 +79,33 @@ impl Shared {
                 let Some(point) = texel.point(sources.scene, x, y) else { continue };
                 let receiver = receiver(sources.scene, &point);
                 let [choice, u, v, _] = sequence.point(sample, 1);
-                let found = sources.sample(shared, &receiver, [choice, u, v]);
-                *sum += found.baked;
-                self.mixed += found.mixed;
-                self.inverse_distances += found.inverse_distance;
-                self.rays += u32::from(found.asked);
+                let light = sources.sample(shared, &receiver, [choice, u, v]);
+                *sum += light.baked;
+                self.mixed += light.mixed;
+                self.inverse_distances += light.inverse_distance;
+                self.rays += u32::from(light.asked);
             }
         }
         self.samples = self.samples.max(samples);
     }
 }
 
-/// The texels, as this stage needs them.
+/// The sums of all texels, with what is needed to sample and smooth more.
 pub(crate) struct SharedLight<'a> {
     sources: &'a Sources<'a>,
     texels: &'a [Texel],
     cuts: &'a LightCuts,
     neighbourhoods: Neighbourhoods<'a>,
     options: &'a BakeOptions,
-    /// Samples of each replicate: in the first round, and at most.
+    /// Samples of each replicate, in the first round and at most.
     first: u32,
     most: u32,
-    pub found: Vec<Shared>,
+    /// Per covered texel.
+    sums: Vec<SampleSums>,
 }
 
 impl<'a> SharedLight<'a> {
-    /// The first round: a few samples of every texel that is `wanted`, by its place.
+    /// The first round: a few samples of every texel for whose index `is_wanted` holds.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
@@ -109,42 +113,43 @@ impl<'a> SharedLight<'a> {
         sources: &'a Sources<'a>,
         neighbourhoods: Neighbourhoods<'a>,
         cuts: &'a LightCuts,
-        wanted: impl Fn(usize) -> bool + Sync,
+        is_wanted: impl Fn(usize) -> bool + Sync,
         options: &'a BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
         let texels = neighbourhoods.texels;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
         let mut light =
-            Self { sources, texels, cuts, neighbourhoods, options, first, most, found: Vec::new() };
-        // A complete map first, whatever time it takes; where that is limited, roughly.
+            Self { sources, texels, cuts, neighbourhoods, options, first, most, sums: Vec::new() };
+        // A complete map comes first, whatever time it takes; if time is limited, with a single sample.
         let begun = monitor.seconds();
         let few = if options.time.is_some() { 1 } else { first };
-        light.found = in_chunks(texels.len(), monitor, |place| {
-            let mut own = Shared::default();
-            if wanted(place) {
-                light.add(place, &mut own, few);
+        light.sums = in_chunks(texels.len(), monitor, |place| {
+            let mut sums = SampleSums::default();
+            if is_wanted(place) {
+                light.add(place, &mut sums, few);
             }
-            own
+            sums
         })?;
         let samples = monitor.clock().affordable(few, first, monitor.seconds() - begun);
         if samples > few {
             let more = in_chunks_until_deadline(texels.len(), monitor, |place| {
-                let mut own = light.found[place];
-                if wanted(place) {
-                    light.add(place, &mut own, samples);
+                let mut sums = light.sums[place];
+                if is_wanted(place) {
+                    light.add(place, &mut sums, samples);
                 }
-                own
+                sums
             })?;
-            light.found.splice(..more.len(), more);
+            light.sums.splice(..more.len(), more);
         }
         Ok(light)
     }
 
-    fn add(&self, place: usize, own: &mut Shared, samples: u32) {
+    /// Adds samples to the sums of a texel until each replicate has `samples`.
+    fn add(&self, place: usize, sums: &mut SampleSums, samples: u32) {
         let (texel, shared) = (&self.texels[place], &self.cuts.of(place).shared);
         if !texel.is_hidden() && !shared.is_empty() {
-            own.add(
+            sums.add(
                 self.sources,
                 shared,
                 texel,
@@ -155,19 +160,19 @@ impl<'a> SharedLight<'a> {
         }
     }
 
-    /// What is known so far, without smoothing, in addition to the light of the sources that have samples of their own.
+    /// The light of individually sampled sources plus that of shared ones, without smoothing, as far as it is known.
     pub fn with(&self, direct: &[Direct]) -> Vec<Direct> {
-        let both = |(direct, own): (&Direct, &Shared)| {
-            let mut both = *direct;
-            both.baked += mean(&own.estimates());
-            both
+        let total = |(direct, sums): (&Direct, &SampleSums)| {
+            let mut total = *direct;
+            total.baked += mean(&sums.estimates());
+            total
         };
-        direct.par_iter().zip(&self.found).map(both).collect()
+        direct.par_iter().zip(&self.sums).map(total).collect()
     }
 
-    /// More rounds, and what they bring, added to `direct`. `goal` tells for a share of the squared error asked for the sum over all texels of
-    /// squared errors, relative to the light around them, that may then be left; `share` tells that share, for so many samples for each texel
-    /// as are foreseen for the `least` one.
+    /// Takes more rounds, and adds their light to `direct`. `goal` maps a share of the requested squared error to the
+    /// sum over all texels of squared errors, relative to local light, that may then be left. `share` maps the samples
+    /// per texel that the `least` share is expected to need to the share that is aimed at.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
@@ -179,70 +184,82 @@ impl<'a> SharedLight<'a> {
         goal: &impl Fn(f64) -> f64,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
-        let (mut before, mut chosen) = (f64::INFINITY, None);
+        let (mut before, mut chosen_share) = (f64::INFINITY, None);
         let (estimates, variances) = loop {
-            let raw: Vec<Estimates> = self.found.par_iter().map(Shared::estimates).collect();
+            let raw: Vec<Estimates> = self.sums.par_iter().map(SampleSums::estimates).collect();
             let (estimates, bias) = monitor.run_interruptible(1.0, || match self.options.denoise {
                 true => {
-                    let near: Vec<f32> = self.found.par_iter().map(Shared::inverse_distance).collect();
-                    smooth(&self.neighbourhoods, &raw, &near)
+                    let inverse_distances: Vec<f32> =
+                        self.sums.par_iter().map(SampleSums::inverse_distance).collect();
+                    smooth(&self.neighbourhoods, &raw, &inverse_distances)
                 }
-                false => (raw, vec![0.0; self.found.len()]),
+                false => (raw, vec![0.0; self.sums.len()]),
             })?;
             let spread = monitor.run_interruptible(1.0, || spread(&self.neighbourhoods, &estimates))?;
             let variances = spread.with(&bias);
             let relative = local.relative_errors(&variances);
-            let asked = |texel: &CoveredTexel| self.found[texel.place()].samples > 0;
-            let asking = CoveredTexel::all(self.texels.len()).filter(asked);
+            let is_sampled = |texel: &CoveredTexel| self.sums[texel.place()].samples > 0;
+            let sampled = CoveredTexel::all(self.texels.len()).filter(is_sampled);
             let summed =
-                |squares: &[f32]| asking.clone().map(|texel| f64::from(squares[texel.place()])).sum::<f64>();
+                |squares: &[f32]| sampled.clone().map(|texel| f64::from(squares[texel.place()])).sum::<f64>();
             let left = summed(&relative.expected);
-            let stalled = left > STALLED * before;
-            let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
+            let is_stalled = left > STALLED * before;
+            let samples: Vec<u32> = self.sums.iter().map(|sums| sums.samples).collect();
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-            let count = asking.clone().count() as u64;
+            let count = sampled.clone().count() as u64;
             let budget = self.options.effort().budget(count) / REPLICATES as u64;
             let budget = budget.saturating_sub(taken);
-            // Samples are given out by the cautious figures; the goal is one of expected ones.
-            let feared = summed(&relative.cautious) / left;
+            // Samples are allocated by the cautious errors, but the goal is for the expected ones: scale it.
+            let caution = summed(&relative.cautious) / left;
             let allocate = |goal: f64| -> Vec<SampleAllocation> {
-                let asking = asking.clone();
-                allocate_within(budget, asking, &relative.cautious, &samples, self.most, ORDER, feared * goal)
+                let sampled = sampled.clone();
+                allocate_within(
+                    budget,
+                    sampled,
+                    &relative.cautious,
+                    &samples,
+                    self.most,
+                    ORDER,
+                    caution * goal,
+                )
             };
-            // Before the least share is in reach of a round, a few texels of which little is known hide what the others take.
-            if chosen.is_none() && left <= MAX_OF_A_ROUND * goal(least) {
-                let more = |own: &SampleAllocation| u64::from(own.samples - samples[own.texel.place()]);
+            // Before a round can reach the least share, a few uncertain texels dominate and the samples of the others
+            // cannot be foreseen.
+            if chosen_share.is_none() && left <= MAX_REDUCTION * goal(least) {
+                let more = |allocation: &SampleAllocation| {
+                    u64::from(allocation.samples - samples[allocation.texel.place()])
+                };
                 let foreseen = taken + allocate(goal(least)).iter().map(more).sum::<u64>();
-                chosen = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
+                chosen_share = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
             }
-            let goal = goal(chosen.unwrap_or(least));
-            if left <= goal * ENOUGH || stalled || monitor.clock().is_over() {
+            let goal = goal(chosen_share.unwrap_or(least));
+            if left <= goal * ENOUGH || is_stalled || monitor.clock().is_over() {
                 break (estimates, variances);
             }
             before = left;
-            let wanted = allocate(goal.max(left / MAX_OF_A_ROUND));
+            let allocated = allocate(goal.max(left / MAX_REDUCTION));
             monitor.pass(PASS);
-            let more = in_chunks_until_deadline(wanted.len(), monitor, |index| {
-                let SampleAllocation { texel, samples } = wanted[index];
-                let mut own = self.found[texel.place()];
-                self.add(texel.place(), &mut own, samples);
-                own
+            let more = in_chunks_until_deadline(allocated.len(), monitor, |index| {
+                let SampleAllocation { texel, samples } = allocated[index];
+                let mut sums = self.sums[texel.place()];
+                self.add(texel.place(), &mut sums, samples);
+                sums
             })?;
             if more.is_empty() {
                 break (estimates, variances);
             }
-            for (allocated, own) in wanted.iter().zip(more) {
-                self.found[allocated.texel.place()] = own;
+            for (allocation, sums) in allocated.iter().zip(more) {
+                self.sums[allocation.texel.place()] = sums;
             }
         };
-        for (place, (direct, own)) in direct.iter_mut().zip(&self.found).enumerate() {
-            if own.samples > 0 {
+        for (place, (direct, sums)) in direct.iter_mut().zip(&self.sums).enumerate() {
+            if sums.samples > 0 {
                 let (estimates, variance) = (&estimates[place], variances.cautious[place]);
                 direct.baked += mean(estimates).max(Vec3::ZERO);
-                direct.mixed += own.mixed / (own.samples * REPLICATES as u32) as f32;
+                direct.mixed += sums.mixed / (sums.samples * REPLICATES as u32) as f32;
                 direct.variance += variance;
                 direct.caution += variance - variances.expected[place];
-                direct.rays += own.rays;
+                direct.rays += sums.rays;
                 direct.sampled = true;
             }
         }

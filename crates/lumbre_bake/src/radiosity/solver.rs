@@ -109,7 +109,7 @@ impl System for Radiosity<'_> {
         residual.iter().zip(self.diagonal).map(|(r, d)| r / d).collect()
     }
 
-    fn goes_on(&self, steps: usize, left: &[f64], energy: f64) -> bool {
+    fn should_continue(&self, steps: usize, left: &[f64], energy: f64) -> bool {
         norm(self.factors, left) > self.enough
             && energy > 0.0
             && steps < MAX_ITERATIONS as usize

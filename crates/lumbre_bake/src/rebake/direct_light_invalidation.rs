@@ -8,9 +8,9 @@ use lumbre_optics::LightKind;
 use rayon::prelude::*;
 
 use super::changed_box::ChangedBox;
-use crate::coverage::blocks::Blocks;
 use crate::coverage::footprint::{Texel, receiver};
-use crate::coverage::tiles::positions_of;
+use crate::coverage::texel_geometry::positions_of;
+use crate::coverage::texel_groups::TexelGroups;
 use crate::scene::{Canonical, PlacedLight};
 use crate::sources::emitters::lamps;
 use crate::sources::light_sources::Sources;
@@ -82,7 +82,7 @@ pub(crate) fn shadowed(
 ) -> Vec<bool> {
     let scene = sources.scene;
     let volumes = ShadowVolumes::new(sources, boxes);
-    let blocks = Blocks::new(texels, charts, BLOCK);
+    let blocks = TexelGroups::blocks(texels, charts, BLOCK);
     let reached: Vec<bool> = blocks
         .members
         .par_iter()
@@ -99,7 +99,7 @@ pub(crate) fn shadowed(
             volumes.cross(&shown)
         })
         .collect();
-    blocks.of.iter().map(|&block| reached[block as usize]).collect()
+    blocks.group_of.iter().map(|&block| reached[block as usize]).collect()
 }
 
 fn spheres(sources: &Sources<'_>) -> Vec<Source> {

@@ -15,9 +15,9 @@ use super::choice;
 use super::direct_light_invalidation::ShadowVolumes;
 use super::estimate::{Estimate, Range, cap, in_cap};
 use crate::chunks::in_chunks;
-use crate::coverage::blocks::Blocks;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Texel, receiver};
+use crate::coverage::texel_groups::TexelGroups;
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
 use crate::final_gather::reused_gather::ReusedGather;
@@ -75,7 +75,7 @@ struct IndirectChange<'a> {
     scene: &'a BakeScene,
     layout: &'a LightmapLayout,
     changes: &'a Changes<'a>,
-    blocks: Blocks,
+    blocks: TexelGroups,
     /// Per texel of all maps, by how much direct light (mixed lights included) has changed, W/m².
     direct: Vec<Vec3>,
     /// Irradiance of an unhidden sky now, W/m².
@@ -116,7 +116,7 @@ impl<'a> IndirectChange<'a> {
             scene: sources.scene,
             layout,
             changes,
-            blocks: Blocks::new(texels, charts, BLOCK),
+            blocks: TexelGroups::blocks(texels, charts, BLOCK),
             direct: change,
             sky: sources.sky,
             cones: changes.boxes.iter().map(|b| (b.center(), b.radius())).collect(),
@@ -245,7 +245,7 @@ impl<'a> IndirectChange<'a> {
             });
             if within { f32::INFINITY } else { self.seen(sequence, &point, light).most() }
         })?;
-        Ok(self.blocks.of.iter().map(|&block| found[block as usize]).collect())
+        Ok(self.blocks.group_of.iter().map(|&block| found[block as usize]).collect())
     }
 
     /// Whether a point is in a changed box, or next to it.

@@ -39,6 +39,13 @@ impl MapLayout {
     pub fn places(&self) -> Range<usize> {
         self.first..self.first + (self.width * self.height) as usize
     }
+
+    /// The texels at most `radius` columns and rows away from one, itself included, row by row.
+    pub fn neighbourhood(&self, x: u32, y: u32, radius: u32) -> impl Iterator<Item = MapTexel> {
+        let columns = x.saturating_sub(radius)..=(x + radius).min(self.width - 1);
+        let rows = y.saturating_sub(radius)..=(y + radius).min(self.height - 1);
+        rows.flat_map(move |y| columns.clone().map(move |x| self.texel(x, y)))
+    }
 }
 
 /// The texels of all objects.

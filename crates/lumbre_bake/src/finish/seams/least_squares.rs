@@ -322,7 +322,7 @@ impl System for Free<'_> {
         residual.iter().zip(&self.channel.preconditioner).map(|(r, p)| r * p).collect()
     }
 
-    fn goes_on(&self, steps: usize, _: &[f64], energy: f64) -> bool {
+    fn should_continue(&self, steps: usize, _: &[f64], energy: f64) -> bool {
         let is_enough = energy <= self.small_energy || !energy.is_finite();
         steps < self.most_steps && !is_enough && !self.channel.stop.is_cancelled()
     }

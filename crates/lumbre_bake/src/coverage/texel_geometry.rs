@@ -1,6 +1,5 @@
-//! Tiles of texels that show one flat triangle: what is true of all of a tile is found once. Not what is found.
-
-use std::collections::HashMap;
+//! The geometry of what texels show: its points, whether it is flat, and a rectangle around it. Groups of texels are in
+//! `texel_groups`.
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -8,45 +7,7 @@ use super::footprint::{Footprint, Texel};
 use crate::scene::BakeScene;
 use crate::visibility::shaft::{Area, contact};
 
-/// Texels along a tile's side.
-const SIDE: u32 = 8;
-
-/// Covered texels by tiles.
-#[derive(Default)]
-pub(crate) struct Tiles {
-    /// Of each tile, the numbers of its texels.
-    pub members: Vec<Vec<u32>>,
-    /// The tile of each covered texel.
-    pub tile_of: Vec<u32>,
-}
-
-impl Tiles {
-    /// Of texels that are ordered by maps and rows.
-    pub fn new(texels: &[Texel]) -> Self {
-        let mut numbers: HashMap<Key, u32> = HashMap::new();
-        let mut tiles = Self { members: Vec::new(), tile_of: Vec::with_capacity(texels.len()) };
-        let mut last: Option<(Key, u32)> = None;
-        for (place, texel) in texels.iter().enumerate() {
-            let key = (texel.object, texel.y / SIDE, texel.x / SIDE, texel.triangle);
-            let number = match last {
-                Some((known, number)) if known == key => number,
-                _ => *numbers.entry(key).or_insert_with(|| {
-                    tiles.members.push(Vec::new());
-                    tiles.members.len() as u32 - 1
-                }),
-            };
-            last = Some((key, number));
-            tiles.members[number as usize].push(place as u32);
-            tiles.tile_of.push(number);
-        }
-        tiles
-    }
-}
-
-/// Map, row and column of a tile, and the triangle.
-type Key = (u32, u32, u32, u32);
-
-/// Places whose hull holds all that a texel shows.
+/// Appends points whose convex hull contains everything that a texel shows.
 pub(crate) fn positions_of(scene: &BakeScene, texel: &Texel, positions: &mut Vec<Vec3>) {
     let mut add = |triangle: u32, (u, v)| positions.push(scene.triangles[triangle as usize].position(u, v));
     match &texel.footprint {
@@ -62,28 +23,28 @@ pub(crate) fn positions_of(scene: &BakeScene, texel: &Texel, positions: &mut Vec
     }
 }
 
-/// Whether all that a texel shows is flat and looks where a triangle looks.
+/// Whether everything that a texel shows is flat and has the normal of `triangle`.
 pub(crate) fn shows_plane(scene: &BakeScene, texel: &Texel, triangle: u32) -> bool {
     let normal = scene.triangles[triangle as usize].normal;
-    let same = |index: u32| {
+    let has_same_normal = |index: u32| {
         let other = &scene.triangles[index as usize];
         index == triangle || (other.flat && other.normal.dot(normal) > 0.9999)
     };
     match &texel.footprint {
-        Footprint::Whole(own) => same(*own),
-        Footprint::Points(points) => points.iter().all(|point| same(point.triangle)),
+        Footprint::Whole(index) => has_same_normal(*index),
+        Footprint::Points(points) => points.iter().all(|point| has_same_normal(point.triangle)),
         Footprint::Hidden => true,
     }
 }
 
-/// A rectangle on a flat triangle around places on it; none where they are not in its plane.
-pub(crate) fn area(scene: &BakeScene, triangle: u32, positions: &[Vec3]) -> Option<Area> {
+/// A rectangle around some points in the plane of a flat triangle; `None` if they are not in that plane.
+pub(crate) fn bounding_area(scene: &BakeScene, triangle: u32, positions: &[Vec3]) -> Option<Area> {
     let triangle = &scene.triangles[triangle as usize];
     let (origin, normal) = (triangle.corners[0].as_dvec3(), triangle.normal.as_dvec3().try_normalize()?);
     if !triangle.flat || positions.is_empty() {
         return None;
     }
-    // Along the map's rows, and across.
+    // The rectangle's axes: along the map's rows, and perpendicular to them.
     let [p, q, r] = triangle.corners.map(|corner| corner.as_dvec3());
     let [a, b, c] = triangle.uv;
     let row = (q - p) * f64::from((c - a).y) - (r - p) * f64::from((b - a).y);
