@@ -24,9 +24,9 @@ const INSIDE: f32 = 0.25;
 /// How many times more samples are taken if the first ones were all below the side's horizon.
 const RETRY_FACTOR: u32 = 16;
 
-/// First this share of the samples to the emitters (one in so many) is taken. The rest follows only where the standard
-/// error of the first ones is larger than this share of the side's light.
-const PILOT_SHARE: u32 = 4;
+/// A pilot run takes the number of samples to the emitters divided by `PILOT_DIVISOR`. All samples are taken only where
+/// the standard error of the pilot is larger than `MAX_PILOT_ERROR` of the side's light.
+const PILOT_DIVISOR: u32 = 4;
 const MAX_PILOT_ERROR: f32 = 0.02;
 
 /// The light sources of probes.
@@ -74,7 +74,8 @@ impl ProbeLight<'_> {
             let squares: Vec3 = runs.iter().map(|run| (run[side] - *light).powf(2.0)).sum();
             let variance_of_mean = squares / (count * (count - 1.0));
             let sequence = Sequence::new(seed, Stream::ProbeSide(side as u32), index);
-            let pilot = self.emitter_irradiance(position, normal, sequence, self.effort.shadow / PILOT_SHARE);
+            let pilot =
+                self.emitter_irradiance(position, normal, sequence, self.effort.shadow / PILOT_DIVISOR);
             let is_uncertain = pilot.variance.sqrt() / PI
                 > MAX_PILOT_ERROR * (*light + pilot.baked / PI).element_sum() / 3.0;
             let direct = match is_uncertain {

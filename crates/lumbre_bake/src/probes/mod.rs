@@ -7,7 +7,8 @@
 //! a lightmap by them.
 //!
 //! ```text
-//!   grid: cells over the static scene and what moves ─► light: six sides per cell, inside or not ─► fill: cells inside geometry
+//!   grid: cells over the static scene and what moves ─► light: six sides per cell, inside or not
+//!                                                    ─► fill: cells inside geometry
 //! ```
 
 mod fill;

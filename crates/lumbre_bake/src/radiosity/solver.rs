@@ -11,7 +11,7 @@ use crate::conjugate_gradients::{self, System};
 use crate::options::Solver;
 
 impl Solver {
-    /// Iterates until the relative residual is at most `tolerance`. The norms of both are those of `solution`.
+    /// Iterates until the residual is at most `tolerance`, relative to the emission as [`Solution::residual`] is.
     pub(crate) fn solve(
         self,
         factors: &FormFactors,

@@ -117,13 +117,13 @@ fn count_missing<'h>(
 pub(crate) struct Changes<'a> {
     pub former: &'a Content,
     /// Whether nothing differs, so that everything is kept as it is.
-    pub none: bool,
+    pub nothing_changed: bool,
     /// Per object, whether it is new or has changed.
     pub changed: Vec<bool>,
     /// Of changed objects, before and after.
     pub boxes: Vec<ChangedBox>,
-    /// Whether the lights have changed, so that direct light may differ everywhere.
-    pub lights: bool,
+    /// Whether lights, the sky or emissive surfaces have changed, so that direct light may differ everywhere.
+    pub lights_changed: bool,
     /// What has changed, for the report.
     pub names: Vec<String>,
     /// Per covered texel, its former samples, if it still shows the same surface.
@@ -169,7 +169,7 @@ impl<'a> Changes<'a> {
         };
         let emitters_changed =
             emission.iter().zip(&unchanged).any(differs) || gone.iter().any(|gone| gone.emission != 0);
-        let lights_changed = former.lights != hashes.lights;
+        let lights_or_sky_changed = former.lights != hashes.lights;
         let bounds = bounds(scene, layout);
         let after = (0..objects.len()).filter(|&object| changed[object]).map(|object| {
             let (low, high) = bounds[object];
@@ -181,21 +181,31 @@ impl<'a> Changes<'a> {
             former_exitance: Some(object.exitance),
         });
         let boxes: Vec<ChangedBox> = after.chain(before).filter(|b| b.low.cmple(b.high).all()).collect();
-        let names = names(objects, &changed, &gone, lights_changed);
+        let names = names(objects, &changed, &gone, lights_or_sky_changed);
         let (known, former_light) = known(scene, layout, texels, &unchanged);
-        let none = former.content == hashes.content;
-        let lights = emitters_changed || lights_changed;
+        let nothing_changed = former.content == hashes.content;
+        let lights_changed = emitters_changed || lights_or_sky_changed;
         let unless_shadowed = |(known, is_shadowed): (&Option<&TexelSamples>, bool)| {
             known.filter(|_| !is_shadowed).map(|known| known.direct)
         };
-        let known_direct = match lights {
+        let known_direct = match lights_changed {
             true => vec![None; texels.len()],
             false => {
                 let shadowed = shadowed(sources, texels, charts, &boxes);
                 known.iter().zip(shadowed).map(unless_shadowed).collect()
             }
         };
-        Self { former, none, changed, boxes, lights, names, known, known_direct, former_light }
+        Self {
+            former,
+            nothing_changed,
+            changed,
+            boxes,
+            lights_changed,
+            names,
+            known,
+            known_direct,
+            former_light,
+        }
     }
 
     /// Number of covered texels whose direct light is computed anew.

@@ -14,7 +14,7 @@ const MAX_SHARE: f64 = 0.3;
 const MAX_TEXEL_SHARE: f64 = 0.5;
 
 /// Chooses texels in the order of their errors by reuse until the limit is reached, given the change of each covered
-/// texel (W/m², mean of the channels), the light around it, and the requested RMSE relative to that light.
+/// texel (W/m², root mean square of the channels), the light around it, and the requested RMSE relative to that light.
 pub(super) fn choose(
     changes: &Changes<'_>,
     texels: &[Texel],

@@ -134,7 +134,7 @@ impl<'a> IndirectChange<'a> {
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<Range>, BakeError> {
-        if self.changes.none {
+        if self.changes.nothing_changed {
             return Ok(Vec::new());
         }
         let Exchange { patches, exitance, .. } = exchange;
@@ -198,7 +198,8 @@ impl<'a> IndirectChange<'a> {
         let is_unknown = |patch: &Patch| {
             patch.side == Side::Back
                 && patch.reflectance != Vec3::ZERO
-                && (self.changes.lights || self.shadow_volumes.cross(&patches.corners(self.scene, patch)))
+                && (self.changes.lights_changed
+                    || self.shadow_volumes.cross(&patches.corners(self.scene, patch)))
         };
         patches.list.par_iter().map(is_unknown).collect()
     }
@@ -213,7 +214,7 @@ impl<'a> IndirectChange<'a> {
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<ReusedGather, BakeError> {
-        if self.changes.none {
+        if self.changes.nothing_changed {
             return Ok(choice::keep_all(self.changes));
         }
         let Exchange { patches, exitance, .. } = exchange;
@@ -371,7 +372,8 @@ impl<'a> IndirectChange<'a> {
                 let inverse = 1.0 / direction[axis];
                 let (a, b) =
                     ((b.low[axis] - origin[axis]) * inverse, (b.high[axis] - origin[axis]) * inverse);
-                // NaN where the ray lies in the plane of a side; `min` and `max` then ignore it.
+                // Both are NaN for a ray in the plane of a flat box, and `min` and `max` ignore them. (Only one is NaN
+                // for a ray in the plane of a side of another box: the ray then counts as outside.)
                 from = from.max(a.min(b));
                 to = to.min(a.max(b));
             }

@@ -5,13 +5,13 @@
 //! ```text
 //!   samples of the former bake ─► changes ─► objects that moved, came or went ─► boxes that block light, or did before
 //!                                   │
-//!                                   ├─► direct_light_invalidation: texels with a path to a light through such a box get
-//!                                   │       new direct light
+//!                                   ├─► direct_light_invalidation: texels with a path to a light through such a box
+//!                                   │       get new direct light
 //!                                   │
-//!                                   └─► indirect_change: a linear estimate of the change of the light by bounces, first
-//!                                           of patches, then of texels
-//!                                           └─► choice: keeps the texels whose estimated change, together with their
-//!                                                   reuse_error so far, is small beside the requested error
+//!                                   └─► indirect_change: a linear estimate of the change of the light by bounces,
+//!                                       │   first of patches, then of texels
+//!                                       └─► choice: keeps the texels whose estimated change, together with their
+//!                                               reuse_error so far, is small beside the requested error
 //! ```
 //!
 //! Light is linear: the change of the light by bounces obeys the radiosity equation of the new scene, with the
