@@ -161,7 +161,6 @@ pub(crate) mod tests {
     use fearless_simd::Level;
     use glam::Vec3;
 
-    use super::super::kernel::Kernel;
     use super::*;
     use crate::denoise::kernel::Kernel;
     use crate::denoise::surface::Surface;

@@ -1,21 +1,21 @@
-//! Where probes stand: the centres of the cells of a box around everything. Not what they see.
+//! Where the probes are: at the centres of the cells of a box around the scene. Their light is computed in `light`.
 
 use glam::{DVec3, UVec3, Vec3};
 use lumbre_scene::Transform;
 
 use crate::scene::{BakeScene, Canonical};
 
-/// Most probes that are placed without a spacing.
-const BUDGET: u64 = 4096;
+/// Most probes if no spacing is requested.
+const DEFAULT_MAX_PROBES: u64 = 4096;
 
-/// Most probes with one: six colours each make 25 MB.
-const LIMIT: u64 = 1 << 18;
+/// Most probes if a spacing is requested: with six colours each they take 25 MB.
+const MAX_PROBES: u64 = 1 << 18;
 
-/// Most cells along an axis: the texture has three times as many along z, and 2048 is what every GPU takes.
+/// Most cells along an axis: the texture has three times as many along z, and every GPU supports 2048.
 const MAX_CELLS: f64 = 682.0;
 
-/// Least thickness of the box, of its longest side: above a floor there is room too.
-const THINNEST: f64 = 1.0 / 16.0;
+/// Least thickness of the box as a share of its longest side: above a flat floor there must be probes too.
+const MIN_THICKNESS: f64 = 1.0 / 16.0;
 
 /// A box of cells, canonical units.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +26,8 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Around the scene and the points of what moves (world space): cells of at most `spacing` metres, or as small as the budget allows.
+    /// A grid around the scene and the points of moving objects (world space), with cells of at most `spacing` metres,
+    /// or as small as the number of probes allows.
     pub fn new(
         scene: &BakeScene,
         moving: &[DVec3],
@@ -44,36 +45,37 @@ impl Grid {
             (low, high) = (DVec3::ZERO, DVec3::ZERO);
         }
         let mut size = high - low;
-        let least = if size.max_element() > 0.0 { THINNEST * size.max_element() } else { 1.0 };
+        let least = if size.max_element() > 0.0 { MIN_THICKNESS * size.max_element() } else { 1.0 };
         let middle = 0.5 * low + 0.5 * high;
         size = size.max(DVec3::splat(least));
         let low = middle - 0.5 * size;
-        let asked = spacing.map(|spacing| spacing * scene.space.scale);
-        let budget = if asked.is_some() { LIMIT } else { BUDGET };
-        // The volume of a cell if all of the budget were used: the least that can be.
-        let least = (size.x * (size.y * size.z) / budget as f64).cbrt().max(size.max_element() / MAX_CELLS);
-        let mut side = asked.map_or(least, |asked| asked.max(least));
+        let requested = spacing.map(|spacing| spacing * scene.space.scale);
+        let max_probes = if requested.is_some() { MAX_PROBES } else { DEFAULT_MAX_PROBES };
+        // No side can be shorter than that of a cube whose volume is the box's divided by the most probes.
+        let least =
+            (size.x * (size.y * size.z) / max_probes as f64).cbrt().max(size.max_element() / MAX_CELLS);
+        let mut side = requested.map_or(least, |requested| requested.max(least));
         let mut cells = resolution(size, side);
-        while count(cells) > budget {
+        while count(cells) > max_probes {
             side *= 1.01;
             cells = resolution(size, side);
         }
-        if let Some(asked) = asked.filter(|asked| *asked < side) {
+        if let Some(requested) = requested.filter(|requested| *requested < side) {
             warnings.push(format!(
-                "the probe spacing of {:.3} m was raised to {:.3} m: at most {LIMIT} probes are baked, and {MAX_CELLS} along an axis",
-                asked / scene.space.scale,
+                "the probe spacing of {:.3} m was raised to {:.3} m: at most {MAX_PROBES} probes are baked, and {MAX_CELLS} along an axis",
+                requested / scene.space.scale,
                 side / scene.space.scale
             ));
         }
         Self { resolution: cells, low, size }
     }
 
-    /// How many probes there are.
+    /// Number of probes.
     pub fn count(&self) -> usize {
         count(self.resolution) as usize
     }
 
-    /// Of a probe: along x first, then y, then z.
+    /// Position of a probe, canonical units. Probes are numbered along x first, then y, then z.
     pub fn position(&self, index: usize) -> Vec3 {
         let [width, height, _] = self.resolution.to_array().map(|side| side as usize);
         let cell = [index % width, index / width % height, index / (width * height)];
@@ -81,21 +83,21 @@ impl Grid {
         (self.low + cell / self.resolution.as_dvec3() * self.size).as_vec3()
     }
 
-    /// Sides of a cell, metres.
+    /// Lengths of a cell's sides, metres.
     pub fn spacing(&self, space: Canonical) -> DVec3 {
         self.size / self.resolution.as_dvec3() / space.scale
     }
 
-    /// Maps the unit cube around the origin to the grid.
+    /// Maps the unit cube around the origin to the grid in the world.
     pub fn transform(&self, space: Canonical) -> Transform {
         let middle = (self.low + 0.5 * self.size) / space.scale + space.center;
         Transform::from_translation(middle).with_scale(self.size / space.scale)
     }
 }
 
-/// At least one cell per axis, each at most `side` long.
+/// The fewest cells per axis that are at most `side` long, and at least one.
 fn resolution(size: DVec3, side: f64) -> UVec3 {
-    // Rounding must not add a cell to a side that is a whole number of them.
+    // Rounding must not add a cell where the box is a whole number of cells long.
     (size / side * (1.0 - 1e-9)).ceil().clamp(DVec3::ONE, DVec3::splat(MAX_CELLS)).as_uvec3()
 }
 
@@ -108,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_are_at_most_as_long_as_asked() {
+    fn cells_are_as_few_as_the_longest_side_allows() {
         for size in [DVec3::new(4.0, 2.0, 1.0), DVec3::new(1.0, 0.0625, 0.3), DVec3::splat(0.7)] {
             for side in [0.01, 0.1, 0.25, 2.0, 9.0] {
                 let cells = resolution(size, side);

@@ -1,11 +1,14 @@
-//! Irradiance probes: the baked light in the space between surfaces, for what moves there. Not the lightmaps, and not the drawing.
+//! Irradiance probes: the baked light in the space between surfaces, for moving objects. Lightmaps are not made here,
+//! and probes are not drawn here.
 //!
-//! A probe holds what a moving object does not get from lights in real time: bounces of everything that is baked, the sky, and emissive faces
-//! (those with an `EmissiveLight` apart, which are polygon lights in a frame). The direct light of point, spot and directional lights is
-//! left out, also of static ones: a frame lights what has no lightmap with them.
+//! A probe holds the light that a moving object does not get from lights in real time: bounces of everything that is
+//! baked, the sky, and emissive faces (except those with an `EmissiveLight`, which are polygon lights in a frame). The
+//! direct light of point, spot and directional lights is left out, even of static ones: a frame lights objects without
+//! a lightmap by them.
 //!
 //! ```text
-//!   grid: cells over the static scene and what moves ─► light: six sides per cell, inside or not ─► fill: cells inside geometry
+//!   grid: cells over the static scene and what moves ─► light: six sides per cell, inside or not
+//!                                                    ─► fill: cells inside geometry
 //! ```
 
 mod fill;
@@ -24,13 +27,13 @@ use crate::scene::{BakeScene, StaticScene};
 use crate::sources::light_sources::Sources;
 use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
 
-/// A volume and where it is.
+/// An irradiance volume, and where it is.
 pub(crate) struct PlacedVolume {
     pub volume: IrradianceVolume,
     pub grid: Grid,
 }
 
-/// Bakes the probes, if they are called for; the report says why not.
+/// Bakes the probes. `None` if none are wanted or there is no light for them; the report then says why.
 pub(crate) fn bake(
     input: &StaticScene,
     scene: &BakeScene,
@@ -44,13 +47,13 @@ pub(crate) fn bake(
         report.skipped.push(format!("probes: {reason}"));
         return Ok(None);
     }
-    // A surface of the scene is a primitive.
+    // The scene's surfaces are the input's primitives, in the same order.
     let lights_frames: Vec<bool> = input.primitives().map(|primitive| primitive.lights_frames).collect();
-    let in_frames = |triangle: u32| {
+    let is_lit_in_real_time = |triangle: u32| {
         let surface = scene.triangles[triangle as usize].surface;
         lights_frames.get(surface as usize).copied().unwrap_or(false)
     };
-    let emitters = sources.only_emitters(|emitter| !in_frames(emitter.triangle));
+    let emitters = sources.only_emitters(|emitter| !is_lit_in_real_time(emitter.triangle));
     if emitters.is_empty() && cache.is_none() {
         report
             .skipped
@@ -60,21 +63,21 @@ pub(crate) fn bake(
     monitor.stage(Stage::Probes, report)?;
     let grid = Grid::new(scene, input.moving_points(), options.probe_spacing, &mut report.warnings);
     let clock = monitor.clock();
-    let seen: Vec<ProbeSample> = in_chunks_uncheckpointed(grid.count(), monitor, |index| {
-        // A complete volume, whatever time it takes: roughly, once the time is up.
+    let probes: Vec<ProbeSample> = in_chunks_uncheckpointed(grid.count(), monitor, |index| {
+        // The volume must be complete, so that the remaining probes are sampled roughly once the time is up.
         let quality = if clock.is_over() { Quality::Draft } else { options.quality };
         let light = light::ProbeLight { scene, emitters: &emitters, cache, effort: effort(quality) };
         light.at(grid.position(index), options.seed, index as u32)
     })?;
-    report.rays += seen.iter().map(|seen| seen.rays).sum::<u64>();
-    let valid: Vec<bool> = seen.iter().map(|seen| !seen.inside).collect();
-    let mut cubes: Vec<AmbientCube> = seen.iter().map(|seen| seen.cube).collect();
+    report.rays += probes.iter().map(|probe| probe.rays).sum::<u64>();
+    let valid: Vec<bool> = probes.iter().map(|probe| !probe.inside).collect();
+    let mut cubes: Vec<AmbientCube> = probes.iter().map(|probe| probe.cube).collect();
     fill::fill(grid.resolution, &valid, &mut cubes);
     report.probes = ProbeReport {
         resolution: grid.resolution.to_array(),
         spacing: grid.spacing(scene.space).to_array(),
         inside: valid.iter().filter(|valid| !**valid).count(),
-        estimated_error: light::relative_error(&seen),
+        estimated_error: light::relative_error(&probes),
     };
     if report.probes.inside == grid.count() {
         report.warnings.push(
@@ -88,10 +91,12 @@ pub(crate) fn bake(
     Ok(Some(PlacedVolume { volume, grid }))
 }
 
-/// Rays of a probe over the sphere for each of four replicates, and to the emitters for each of its sides.
+/// Numbers of a probe's samples.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ProbeEffort {
+    /// Rays over the sphere, for each of four replicates.
     sphere: u32,
+    /// Samples of the emitters, for each side.
     shadow: u32,
 }
 

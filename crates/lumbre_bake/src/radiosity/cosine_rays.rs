@@ -1,5 +1,5 @@
-//! Counts for form factors by cosine rays: from points spread over each patch, in directions by the cosine, the patch that is hit first.
-//! Stratified within each patch. Not what becomes of the counts: that is `form_factors`.
+//! Counts for form factors by cosine-distributed rays: they start at points spread over each patch, stratified within
+//! it, and count the patch that they hit first. The counts become form factors in `form_factors`.
 
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
@@ -10,13 +10,13 @@ use crate::radiosity::ray_counts::{PatchRayCounts, counted};
 use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
 use crate::scene::{BakeScene, SurfaceHit};
 
-/// Least and most rays of a patch. The sequence has 65,536 points.
-const RAYS: (f64, f64) = (MIN_RAYS as f64, 65_536.0);
+/// Fewest and most rays per patch. The sequence has 65,536 points.
 pub(crate) const MIN_RAYS: u32 = 32;
-/// Rays of a patch when the time is up.
+const MAX_RAYS: u32 = 65_536;
+/// Rays per patch once the time is up.
 const LATE_RAYS: u32 = 16;
 
-/// About `rays` rays, in proportion to the patches' areas, and how many they were.
+/// Casts about `rays` rays, in proportion to the patches' areas. Returns the counts per patch, and the number of rays.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -31,19 +31,23 @@ pub(crate) fn cast(
     let counts: Vec<u32> = patches
         .list
         .iter()
-        .map(|patch| (rays as f64 * f64::from(patch.area) / total).round().clamp(RAYS.0, RAYS.1) as u32)
+        .map(|patch| {
+            (rays as f64 * f64::from(patch.area) / total)
+                .round()
+                .clamp(f64::from(MIN_RAYS), f64::from(MAX_RAYS)) as u32
+        })
         .collect();
     let clock = monitor.clock();
     let cast = in_chunks(patches.list.len(), monitor, |index| {
         let count = if clock.is_over() { LATE_RAYS } else { counts[index] };
-        of_patch(scene, patches, PatchIndex::new(index), count, seed)
+        cast_from_patch(scene, patches, PatchIndex::new(index), count, seed)
     })?;
     let rays = cast.iter().flat_map(|cast| cast.count).map(u64::from).sum();
     Ok((cast, rays))
 }
 
-/// `count` rays of one patch; the even ones are one half, the odd ones the other.
-pub(crate) fn of_patch(
+/// Casts `count` rays from one patch; the even ones are one half, the odd ones the other.
+pub(crate) fn cast_from_patch(
     scene: &BakeScene,
     patches: &Patches,
     index: PatchIndex,

@@ -1,5 +1,6 @@
-//! The exchange of light between patches: cuts the scene, samples form factors, finds the patches' direct light, solves
-//! each channel. Not the texels.
+//! The exchange of light between patches: divides the scene into patches, samples their form factors, finds their
+//! direct light and solves the radiosity system of each channel. The light of texels is gathered from that in
+//! `final_gather`.
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -19,21 +20,21 @@ use crate::scene::{BakeScene, Receiver};
 use crate::sources::light_sources::Sources;
 use crate::{BakeError, BakeOptions, BakeReport};
 
-/// The solution that the final gather reads.
+/// The light of all patches, which the final gather reads.
 pub(crate) struct Exchange {
     pub patches: Patches,
-    /// Direct irradiance of each patch's open part.
+    /// Direct irradiance of each patch's open part, W/m².
     pub direct: Vec<Vec3>,
-    /// Irradiance by bounces, and by the sky, of each patch.
+    /// Irradiance of each patch by bounces and by the sky, W/m².
     pub indirect: Vec<Vec3>,
-    /// Errors of that, with their signs: a sample of how the form factors' noise spreads, and what the patches' size leaves. Mean of the
-    /// channels.
+    /// Signed errors of `indirect`, mean of the channels: a sample of the error by the form factors' noise, and an
+    /// estimate of the error by the patches' size.
     pub indirect_error: Vec<Vec2>,
-    /// Of each patch, the distance below which it is too coarse to read, canonical units.
+    /// Per patch, the distance below which it is too coarse to be read, canonical units.
     pub near: Vec<f32>,
     /// Where each patch's light by bounces comes from.
     pub guide: SamplingGuide,
-    /// What leaves each patch without emission, W/m².
+    /// Light that leaves each patch, without its emission, W/m².
     pub exitance: Vec<Vec3>,
 }
 
@@ -46,15 +47,16 @@ pub(crate) struct Resolution {
     pub form_factor_rays: usize,
 }
 
-/// Relative residual at which the solver stops: well below what form factors are known to.
+/// Relative residual at which the solver stops: well below the error of the form factors.
 const TOLERANCE: f64 = 1e-5;
 
-/// Shadow rays of a patch to each source, in each half.
+/// Shadow rays from a patch to each source, for each of two halves.
 const SHADOW_RAYS: u32 = 8;
 
 impl Exchange {
-    /// With the form factors that it came from, which a change since a former bake is estimated by. `None` where nothing bounces; the report then
-    /// says why. `direct_light` tells the direct irradiance of patches by two halves of what is known of it; where it tells none, rays do.
+    /// Returns the form factors as well, by which `rebake` estimates what changes since a former bake do to the light.
+    /// `None` where nothing bounces; the report then says why. `known_direct` returns each patch's direct irradiance by
+    /// two independent halves of samples, or `None` for patches of which it is not known: those cast shadow rays.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
@@ -63,7 +65,7 @@ impl Exchange {
         sources: &Sources<'_>,
         options: &BakeOptions,
         resolution: Resolution,
-        direct_light: impl FnOnce(&Patches) -> Vec<Option<[Vec3; 2]>>,
+        known_direct: impl FnOnce(&Patches) -> Vec<Option<[Vec3; 2]>>,
         monitor: &mut BakeMonitor<'_>,
         report: &mut BakeReport,
     ) -> Result<Option<(Self, FormFactors)>, BakeError> {
@@ -73,13 +75,7 @@ impl Exchange {
         report.patches = patches.list.len();
         report.warnings.extend(patches.warnings.iter().cloned());
         if patches.list.iter().all(|patch| patch.reflectance == Vec3::ZERO) {
-            let skipped = match sources.has_sky() {
-                true => {
-                    "form factors and radiosity: no surface reflects (rho = 0); the final gather finds the sky"
-                }
-                false => "form factors, radiosity and final gather: no surface reflects (rho = 0)",
-            };
-            report.skipped.push(skipped.into());
+            report.skipped.push(why_black_scene_is_skipped(sources).into());
             let black = || sources.has_sky().then(|| Self::black(scene, patches, side));
             return monitor.run_interruptible(0.5, black);
         }
@@ -90,54 +86,40 @@ impl Exchange {
         report.energy_lost = factors.energy_lost;
 
         monitor.stage(Stage::Radiosity, report)?;
-        let known = monitor.run_interruptible(0.1, || direct_light(&patches))?;
-        let mut direct_halves = [Vec::new(), Vec::new()];
-        for (half, of_half) in (0..).zip(&mut direct_halves) {
-            let found: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), monitor, |place| {
-                match known.get(place) {
-                    Some(Some(halves)) if factors.open[place] > 0.0 => return (halves[half as usize], 0),
-                    _ => {}
-                }
-                let index = PatchIndex::new(place);
-                let sequence = Sequence::new(options.seed, Stream::PatchLight(half), index.0);
-                patch_direct(scene, sources, &patches, index, factors.open[place], sequence)
-            })?;
-            report.rays += found.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
-            *of_half = found.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
-        }
+        let known = monitor.run_interruptible(0.1, || known_direct(&patches))?;
+        let open = factors.open.as_slice();
+        let (direct_halves, rays) = direct_halves(sources, &patches, open, &known, options.seed, monitor)?;
+        report.rays += rays;
         let [even, odd] = &direct_halves;
         let direct: Vec<Vec3> = even.iter().zip(odd).map(|(even, odd)| 0.5 * (*even + *odd)).collect();
-        let dark = |(direct, patch): (&Vec3, &Patch)| *direct * patch.reflectance == Vec3::ZERO;
-        if !sources.has_sky() && direct.iter().zip(&patches.list).all(dark) {
+        let is_dark = |(direct, patch): (&Vec3, &Patch)| *direct * patch.reflectance == Vec3::ZERO;
+        if !sources.has_sky() && direct.iter().zip(&patches.list).all(is_dark) {
             report
                 .skipped
                 .push("radiosity and final gather: no light reaches a surface that reflects".into());
             return Ok(None);
         }
         monitor.advance(0.5)?;
-        let sky = |factors: &FormFactors| -> Vec<Vec3> {
-            factors.sky.iter().map(|&share| share * sources.sky).collect()
-        };
-        let sky_halves = halves.each_ref().map(&sky);
-        let sky = sky(&factors);
+        let sky = sky_irradiance(&factors, sources);
         let indirect = monitor.run_interruptible(0.5, || {
             solve(options.solver, &factors, &patches.list, &direct, &sky, report)
         })?;
         let noise = monitor.run_interruptible(0.6, || {
-            solution_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list)
+            let sky_halves = halves.each_ref().map(|factors| sky_irradiance(factors, sources));
+            sampling_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list)
         })?;
-        let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
-        let reflectance: Vec<f64> = patches.list.iter().map(|patch| grey(patch.reflectance)).collect();
-        let first: Vec<f64> = direct.iter().zip(&sky).map(|(direct, sky)| grey(*direct + *sky)).collect();
-        let light = (reflectance.as_slice(), first.as_slice());
-        let of_size = monitor.run_interruptible(0.7, || {
-            size_error(scene, &patches, side, &factors, light, (options.solver, TOLERANCE))
+        let by_size = monitor.run_interruptible(0.7, || {
+            let reflectance = mean_reflectances(&patches.list);
+            let arriving = |(direct, sky): (&Vec3, &Vec3)| channel_mean(*direct + *sky);
+            let first: Vec<f64> = direct.iter().zip(&sky).map(arriving).collect();
+            size_error(scene, &patches, side, &factors, (&reflectance, &first), (options.solver, TOLERANCE))
         })?;
-        let indirect_error = noise.iter().zip(of_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
-        let leaves = |(index, patch): (usize, &Patch)| patch.reflectance * (direct[index] + indirect[index]);
-        let exitance: Vec<Vec3> = patches.list.iter().enumerate().map(leaves).collect();
-        let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
+        let indirect_error = noise.iter().zip(by_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
+        let reflected =
+            |(index, patch): (usize, &Patch)| patch.reflectance * (direct[index] + indirect[index]);
+        let exitance: Vec<Vec3> = patches.list.iter().enumerate().map(reflected).collect();
         let guide = monitor.run_interruptible(0.8, || {
+            let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
             SamplingGuide::new(scene, &patches, side, &factors, &radiosity, &sky)
         })?;
         let near = patches.near_distances(scene, side);
@@ -146,52 +128,88 @@ impl Exchange {
 }
 
 impl Exchange {
-    /// What leaves each object without emission, W/m²: the least and the most of its patches, by channel. Backs that light does not meet are black.
+    /// Light that leaves each object, without its emission, W/m²: the least and the most of its patches, by channel.
+    /// Backs that receive no light count as black.
     pub fn exitance_of(&self, scene: &BakeScene, objects: usize) -> Vec<[Vec3; 2]> {
         let mut ranges = vec![[Vec3::INFINITY, Vec3::ZERO]; objects];
         for (patch, exitance) in self.patches.list.iter().zip(&self.exitance) {
             let triangle = &scene.triangles[patch.triangle as usize];
             let [least, most] = &mut ranges[triangle.object as usize];
-            let black_back = !triangle.closed && !triangle.two_sided;
-            *least = least.min(if black_back { Vec3::ZERO } else { *exitance });
+            let has_black_back = !triangle.closed && !triangle.two_sided;
+            *least = least.min(if has_black_back { Vec3::ZERO } else { *exitance });
             *most = most.max(*exitance);
         }
-        let of_nothing =
-            |[least, most]: [Vec3; 2]| [if least.is_finite() { least } else { Vec3::ZERO }, most];
-        ranges.into_iter().map(of_nothing).collect()
+        // An object without patches has no least.
+        let range = |[least, most]: [Vec3; 2]| [if least.is_finite() { least } else { Vec3::ZERO }, most];
+        ranges.into_iter().map(range).collect()
     }
 
-    /// Of surfaces that reflect nothing.
+    /// Of a scene whose surfaces reflect nothing.
     fn black(scene: &BakeScene, patches: Patches, side: f32) -> (Self, FormFactors) {
-        let none = vec![Vec3::ZERO; patches.list.len()];
-        let zeros = vec![0.0; patches.list.len()];
-        let exact = vec![Vec2::ZERO; patches.list.len()];
+        let count = patches.list.len();
+        let dark = vec![Vec3::ZERO; count];
         let factors = FormFactors::none(&patches);
-        let guide = SamplingGuide::new(scene, &patches, side, &factors, &zeros, &none);
+        let guide = SamplingGuide::new(scene, &patches, side, &factors, &vec![0.0; count], &dark);
         let exchange = Self {
-            direct: none.clone(),
-            indirect: none.clone(),
-            indirect_error: exact,
+            direct: dark.clone(),
+            indirect: dark.clone(),
+            indirect_error: vec![Vec2::ZERO; count],
             near: patches.near_distances(scene, side),
             patches,
             guide,
-            exitance: none,
+            exitance: dark,
         };
         (exchange, factors)
     }
 }
 
-/// Direct irradiance of a patch. What other geometry covers receives nothing: the rest has it all.
+/// For the report, where no surface reflects.
+fn why_black_scene_is_skipped(sources: &Sources<'_>) -> &'static str {
+    match sources.has_sky() {
+        true => "form factors and radiosity: no surface reflects (rho = 0); the final gather finds the sky",
+        false => "form factors, radiosity and final gather: no surface reflects (rho = 0)",
+    }
+}
+
+/// Direct irradiance of each patch by two independent halves of samples, and the rays that it took. `open` is the share
+/// of each patch that is not inside other geometry; patches whose light is `known` cast no rays.
+fn direct_halves(
+    sources: &Sources<'_>,
+    patches: &Patches,
+    open: &[f32],
+    known: &[Option<[Vec3; 2]>],
+    seed: u32,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<([Vec<Vec3>; 2], u64), BakeError> {
+    let mut halves = [Vec::new(), Vec::new()];
+    let mut rays = 0;
+    for (number, half) in (0..).zip(&mut halves) {
+        let results: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), monitor, |place| {
+            match known.get(place) {
+                Some(Some(halves)) if open[place] > 0.0 => return (halves[number as usize], 0),
+                _ => {}
+            }
+            let index = PatchIndex::new(place);
+            let sequence = Sequence::new(seed, Stream::PatchLight(number), index.0);
+            patch_direct(sources, patches, index, open[place], sequence)
+        })?;
+        rays += results.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
+        *half = results.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
+    }
+    Ok((halves, rays))
+}
+
+/// Direct irradiance of a patch, and the rays that it took. `open` is the share of the patch that is not inside other
+/// geometry: the part inside receives nothing, so that the mean over the whole patch is divided by that share.
 pub(crate) fn patch_direct(
-    scene: &BakeScene,
     sources: &Sources<'_>,
     patches: &Patches,
     index: PatchIndex,
     open: f32,
     sequence: Sequence,
 ) -> (Vec3, u32) {
-    let patch = &patches.list[index.place()];
-    // What reflects nothing, a lamp mostly, hands nothing on.
+    let (scene, patch) = (sources.scene, &patches.list[index.place()]);
+    // The light on a patch that reflects nothing, usually a lamp's, is not needed.
     if open <= 0.0 || patch.reflectance == Vec3::ZERO {
         return (Vec3::ZERO, 0);
     }
@@ -201,37 +219,52 @@ pub(crate) fn patch_direct(
         let normal = triangle.side_normal(patch.side);
         let position = triangle.position(u, v);
         let origin = scene.off_surface(patch.triangle, patch.side, position);
-        let smooth = triangle.shading_normal(u, v);
-        let smooth = if patch.side == Side::Front { smooth } else { -smooth };
-        Some(Receiver { position, origin, geometric_normal: normal, normal: smooth })
+        let shading = triangle.shading_normal(u, v);
+        let shading = if patch.side == Side::Front { shading } else { -shading };
+        Some(Receiver { position, origin, geometric_normal: normal, normal: shading })
     };
     let direct = sources.irradiance(sequence, SHADOW_RAYS, &point);
     (direct.total() / open, direct.rays)
 }
 
-/// Half the difference of the solutions by two independent halves of the rays, for grey light.
-fn solution_error(
+pub(crate) fn channel_mean(color: Vec3) -> f64 {
+    f64::from(color.element_sum()) / 3.0
+}
+
+/// Reflectance of each patch, mean of the channels.
+pub(crate) fn mean_reflectances(patches: &[Patch]) -> Vec<f64> {
+    patches.iter().map(|patch| channel_mean(patch.reflectance)).collect()
+}
+
+/// Irradiance of each patch by the sky.
+fn sky_irradiance(factors: &FormFactors, sources: &Sources<'_>) -> Vec<Vec3> {
+    factors.sky.iter().map(|&share| share * sources.sky).collect()
+}
+
+/// A sample of the error of `indirect` by the noise of rays: half the difference of the solutions by two independent
+/// halves of the rays, with the mean of the channels as the light.
+fn sampling_error(
     solver: Solver,
     halves: &[FormFactors; 2],
     direct: &[Vec<Vec3>; 2],
     sky: &[Vec<Vec3>; 2],
     patches: &[Patch],
 ) -> Vec<f32> {
-    let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
-    let reflectance: Vec<f64> = patches.iter().map(|patch| grey(patch.reflectance)).collect();
+    let reflectance = mean_reflectances(patches);
     let [a, b] = [0, 1].map(|half| {
         let factors = &halves[half];
         let lit = direct[half].iter().zip(&sky[half]).zip(patches);
         let emission: Vec<f64> =
-            lit.map(|((light, sky), patch)| grey((*light + *sky) * patch.reflectance)).collect();
+            lit.map(|((light, sky), patch)| channel_mean((*light + *sky) * patch.reflectance)).collect();
         let solution = solver.solve(factors, &reflectance, &emission, TOLERANCE);
         let gathered = gather(factors, &solution.radiosity);
-        gathered.iter().zip(&sky[half]).map(|(light, sky)| light + grey(*sky)).collect::<Vec<f64>>()
+        gathered.iter().zip(&sky[half]).map(|(light, sky)| light + channel_mean(*sky)).collect::<Vec<f64>>()
     });
     a.iter().zip(&b).map(|(a, b)| (0.5 * (a - b)) as f32).collect()
 }
 
-/// Irradiance by the sky and by bounces: Σ_j F_ij B_j, with B the solution for what direct light and the sky have left on the patches.
+/// Irradiance of each patch by the sky and by bounces: the latter is Σ_j F_ij B_j, where the radiosity B is the
+/// solution for the reflected direct light and skylight as the emission.
 fn solve(
     solver: Solver,
     factors: &FormFactors,

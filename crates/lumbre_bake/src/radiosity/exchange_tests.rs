@@ -1,4 +1,5 @@
-//! The exchange as a whole: solvers against each other. Both ways to count form factors: that is `method_study_tests`.
+//! Tests of the exchange as a whole: the solvers agree with each other. The two ways to count form factors are compared
+//! in `method_study_tests`.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -18,7 +19,7 @@ use crate::{BakeOptions, BakeReport, Density, Quality};
 
 pub(crate) const MODELS: [&str; 2] = ["models/cornell_box.glb", "conformance/bake/alcove.glb"];
 
-/// Measured data beside the checkout; `None`, loudly, where it is missing.
+/// Loads a model of the shared data beside the checkout; `None`, with a message, where that is missing.
 pub(crate) fn model(name: &str) -> Option<World> {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared")).join(name);
     if !path.exists() {
@@ -30,7 +31,7 @@ pub(crate) fn model(name: &str) -> Option<World> {
     Some(world)
 }
 
-/// The light by bounces of all patches, and what the report says of the solver.
+/// The irradiance by bounces of all patches, and the report.
 fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
     let options = BakeOptions {
         density: Density::MapSize(16),
@@ -46,9 +47,9 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
     let mut report = BakeReport::default();
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let resolution = Resolution { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000 };
-    let by_rays = |_: &Patches| Vec::new();
+    let none_known = |_: &Patches| Vec::new();
     let exchange =
-        Exchange::new(&scene, &sources, &options, resolution, by_rays, &mut monitor, &mut report).unwrap();
+        Exchange::new(&scene, &sources, &options, resolution, none_known, &mut monitor, &mut report).unwrap();
     (exchange.expect("light bounces").0.indirect, report)
 }
 
@@ -57,12 +58,13 @@ fn solvers_agree_on_cornell_and_alcove() {
     for name in MODELS {
         let Some(mut world) = model(name) else { continue };
         let solvers = [Solver::ConjugateGradients, Solver::GaussSeidel, Solver::Jacobi];
-        let found = solvers.map(|solver| solved(&mut world, solver));
-        let (expected, first) = &found[0];
+        let solutions = solvers.map(|solver| solved(&mut world, solver));
+        let (expected, first) = &solutions[0];
         let largest = expected.iter().map(|light| light.max_element()).fold(0.0, f32::max);
         assert!(largest > 0.0 && first.residual > 0.0, "{name}");
-        for ((light, report), solver) in found.iter().zip(solvers) {
-            // Both solutions are off by the residual over 1 - ρ, as a norm; a single patch by what that is of its own.
+        for ((light, report), solver) in solutions.iter().zip(solvers) {
+            // The norm of a solution's error is at most the residual over 1 - ρ; the error of a single patch may be
+            // larger by the ratio of the whole area to its own.
             let bound = (100.0 * (first.residual_bound + report.residual_bound)) as f32;
             for (a, b) in light.iter().zip(expected) {
                 assert!((*a - *b).abs().max_element() <= bound * largest, "{name} {solver:?}: {a} {b}");
@@ -70,8 +72,8 @@ fn solvers_agree_on_cornell_and_alcove() {
             assert!(report.residual <= 1e-5 && report.residual_bound < 1e-3, "{name} {solver:?}: {report:?}");
             assert!(report.iterations.iter().all(|&n| n > 0), "{name} {solver:?}");
         }
-        // Reading what the same sweep has found is never slower.
-        let [_, seidel, jacobi] = found.each_ref().map(|(_, report)| report.iterations[0]);
-        assert!(seidel < jacobi, "{name}: {seidel} {jacobi}");
+        // Reading values that the same sweep has updated is never slower.
+        let [_, gauss_seidel, jacobi] = solutions.each_ref().map(|(_, report)| report.iterations[0]);
+        assert!(gauss_seidel < jacobi, "{name}: {gauss_seidel} {jacobi}");
     }
 }

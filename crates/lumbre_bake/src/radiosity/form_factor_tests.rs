@@ -1,4 +1,4 @@
-//! Form factors against their closed forms: within 5 sigma, sigma = sqrt(F (1 - F) / N).
+//! Tests of form factors against their closed forms: within 5 sigma, sigma = sqrt(F (1 - F) / N).
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ pub(crate) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
 
 const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines];
 
-/// F from the first object to the second, and the rays behind it.
+/// The form factor from the first object to the second, and the number of rays from the first that it was counted from.
 fn factor(objects: &[&[[Vec3; 3]]], side: f32, method: FormFactorMethod) -> (f64, f64) {
     let scene = scene(objects);
     let patches = Patches::new(&scene, side * scene.space.scale as f32);
@@ -60,7 +60,7 @@ fn factor(objects: &[&[[Vec3; 3]]], side: f32, method: FormFactorMethod) -> (f64
     }
     let rays = match method {
         FormFactorMethod::CosineRays => factors.rays as f64,
-        // Of all lines through the bounding sphere 2A / A_sphere cross the first object.
+        // A share of 2A / A_sphere of all lines through the bounding sphere crosses the first object.
         FormFactorMethod::GlobalLines => {
             let corners: Vec<Vec3> = scene.triangles.iter().flat_map(|triangle| triangle.corners).collect();
             let low = corners.iter().copied().fold(Vec3::INFINITY, Vec3::min);
@@ -74,11 +74,11 @@ fn factor(objects: &[&[[Vec3; 3]]], side: f32, method: FormFactorMethod) -> (f64
 
 fn check(name: &str, objects: &[&[[Vec3; 3]]], expected: f64) {
     for (side, method) in [4.0, 0.4].into_iter().flat_map(|side| METHODS.map(|method| (side, method))) {
-        let (found, rays) = factor(objects, side, method);
+        let (factor, rays) = factor(objects, side, method);
         let sigma = (expected * (1.0 - expected) / rays).sqrt();
         assert!(
-            (found - expected).abs() < 5.0 * sigma,
-            "{name}, patches of {side}, {method:?}: {found} instead of {expected}"
+            (factor - expected).abs() < 5.0 * sigma,
+            "{name}, patches of {side}, {method:?}: {factor} instead of {expected}"
         );
     }
 }
@@ -117,7 +117,7 @@ fn perpendicular_squares_down_to_a_shared_edge() {
 }
 
 #[test]
-fn a_blocker_blocks() {
+fn a_blocker_between_makes_the_form_factor_0() {
     let lower = square([0.0; 3], Vec3::Z, Vec3::X);
     let upper = square([0.0, 1.0, 0.0], Vec3::X, Vec3::Z);
     let blocker = square([-9.0, 0.5, -9.0], Vec3::X * 20.0, Vec3::Z * 20.0);
@@ -126,7 +126,7 @@ fn a_blocker_blocks() {
     }
 }
 
-/// A cube seen from inside: turned faces of `cuboid`.
+/// A cube seen from inside: a cuboid whose faces are flipped.
 fn room() -> Vec<[Vec3; 3]> {
     let outside = lumbre_mesh::shapes::cuboid(Vec3::ONE, 1).triangle_positions().unwrap();
     outside.into_iter().map(|[a, b, c]| [a, c, b]).collect()
@@ -141,7 +141,7 @@ fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
         let monitor = &mut BakeMonitor::new(&mut carry_on, None);
         let (factors, _) = FormFactors::sample(&scene, &patches, method, 100_000, 3, monitor).unwrap();
         for i in PatchIndex::all(factors.len()) {
-            // Twelve rounds of scaling leave what f32 and their own convergence leave.
+            // Twelve rounds of scaling have not quite converged, and entries are f32.
             assert!((factors.row_sum(i) - 1.0).abs() < 2e-3, "{method:?} row {i:?}: {}", factors.row_sum(i));
             assert!(factors.row_sum(i) <= 1.0 + 1e-6);
             for (j, g) in factors.row(i) {
@@ -154,18 +154,19 @@ fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
 }
 
 #[test]
-fn what_stands_between_near_patches_counts() {
+fn blockers_between_near_patches_count() {
     let lower = square([0.0; 3], Vec3::Z, Vec3::X);
     let upper = square([0.0, 0.1, 0.0], Vec3::X, Vec3::Z);
-    let all = square([-9.0, 0.05, -9.0], Vec3::X * 20.0, Vec3::Z * 20.0);
-    // Over x < .5, so low that it parts both squares in two: .8 by half, with what passes the rim.
-    let half = square([-9.0, 0.05, -9.0], Vec3::X * 9.5, Vec3::Z * 20.0);
+    let full_blocker = square([-9.0, 0.05, -9.0], Vec3::X * 20.0, Vec3::Z * 20.0);
+    // It covers x < 0.5 and divides the narrow gap between the squares in two: F is about half of 0.8, and a little
+    // more by what passes its edge.
+    let half_blocker = square([-9.0, 0.05, -9.0], Vec3::X * 9.5, Vec3::Z * 20.0);
     for method in METHODS {
-        assert_eq!(factor(&[&lower, &upper, &all], 0.1, method).0, 0.0);
-        let [fine, coarse] = [0.1, 4.0].map(|side| factor(&[&lower, &upper, &half], side, method));
-        let sigma = |(found, rays): (f64, f64)| (found * (1.0 - found) / rays).sqrt();
-        let apart = (fine.0 - coarse.0).abs();
-        assert!(apart < 5.0 * sigma(fine).hypot(sigma(coarse)), "{method:?}: {fine:?} {coarse:?}");
+        assert_eq!(factor(&[&lower, &upper, &full_blocker], 0.1, method).0, 0.0);
+        let [fine, coarse] = [0.1, 4.0].map(|side| factor(&[&lower, &upper, &half_blocker], side, method));
+        let sigma = |(factor, rays): (f64, f64)| (factor * (1.0 - factor) / rays).sqrt();
+        let difference = (fine.0 - coarse.0).abs();
+        assert!(difference < 5.0 * sigma(fine).hypot(sigma(coarse)), "{method:?}: {fine:?} {coarse:?}");
         assert!(fine.0 > 0.35 && fine.0 < 0.5, "{fine:?}");
     }
 }

@@ -1,9 +1,10 @@
-//! Counts for form factors by global lines: straight lines spread evenly over all that cross the scene's bounding sphere. A patch of area A
-//! is crossed by N · 2A / A_sphere of N lines, and the parts of lines that leave its front have the cosine's density; so each part of a line
-//! between two surfaces that face each other is a ray of both at once (Sbert, "An integral geometry based method for fast form-factor
-//! computation", Computer Graphics Forum 12(3), 1993; Sbert, Pueyo, Neumann, Purgathofer, "Global multipath Monte Carlo algorithms for
-//! radiosity", 1996). One low-discrepancy sequence serves all patches. Small patches are crossed seldom: those have cosine rays beside.
-//! Not what becomes of the counts: that is `form_factors`.
+//! Counts for form factors by global lines: straight lines distributed uniformly over all that cross the scene's
+//! bounding sphere. Of N lines, N · 2A / A_sphere cross a patch of area A, and where they leave its front their
+//! directions are cosine-distributed; so each segment of a line between two surfaces that face each other is a ray from
+//! both at once (Sbert, "An integral geometry based method for fast form-factor computation", Computer Graphics Forum
+//! 12(3), 1993; Sbert, Pueyo, Neumann, Purgathofer, "Global multipath Monte Carlo algorithms for radiosity", 1996). One
+//! low-discrepancy sequence serves all patches. Few lines cross a small patch, so small patches cast cosine rays as
+//! well. The counts become form factors in `form_factors`.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -20,10 +21,11 @@ use crate::sampling::{Sequence, Stream, cosine_direction, frame, sphere_directio
 use crate::scene::BakeScene;
 use crate::scene::crossings::Face;
 
-/// Lines of one value of the list that is computed in chunks.
+/// Lines that are cast together, as one value of a list that is computed in chunks.
 const BATCH: u32 = 64;
 
-/// What stands at an end of a line's part: a patch, or one of three numbers that no patch has, as a list of them may be very long.
+/// What is at an end of a line's segment: a patch, or one of three values that are no patch's number. One word each,
+/// since the list of them may be very long.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 struct LineEnd(u32);
 
@@ -47,7 +49,8 @@ impl LineEnd {
     }
 }
 
-/// Lines that cost about as much as `rays` rays, and how many they were, with the rays of small patches.
+/// Casts as many lines as take about the time of `rays` rays. Returns the counts per patch, and the number of lines and
+/// of the rays from small patches together.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -61,26 +64,26 @@ pub(crate) fn cast(
     let lines = Lines::new(scene, seed);
     let count = (rays as f64 / lines.cost(scene)).ceil();
     let batches = (count / f64::from(BATCH)).ceil() as usize;
-    let parts =
-        in_chunks_until_deadline(batches, monitor, |batch| lines.parts(scene, patches, batch as u32))?;
-    let lines = parts.len() as u64 * u64::from(BATCH);
-    let mut cast = counts_of(&parts, patches.list.len());
-    let few = |cast: &PatchRayCounts| cast.count.iter().sum::<u32>() < MIN_RAYS;
-    let seldom: Vec<PatchIndex> =
-        PatchIndex::all(cast.len()).filter(|index| few(&cast[index.place()])).collect();
+    let segments =
+        in_chunks_until_deadline(batches, monitor, |batch| lines.segments(scene, patches, batch as u32))?;
+    let lines = segments.len() as u64 * u64::from(BATCH);
+    let mut counts = counts_of(&segments, patches.list.len());
+    let is_crossed_seldom = |index: &PatchIndex| counts[index.place()].count.iter().sum::<u32>() < MIN_RAYS;
+    let seldom: Vec<PatchIndex> = PatchIndex::all(counts.len()).filter(is_crossed_seldom).collect();
     let rays = in_chunks(seldom.len(), monitor, |place| {
-        cosine_rays::of_patch(scene, patches, seldom[place], MIN_RAYS, seed)
+        cosine_rays::cast_from_patch(scene, patches, seldom[place], MIN_RAYS, seed)
     })?;
     for (index, rays) in seldom.iter().zip(&rays) {
-        cast[index.place()].add(rays);
+        counts[index.place()].add(rays);
     }
-    Ok((cast, lines + rays.len() as u64 * u64::from(MIN_RAYS)))
+    Ok((counts, lines + rays.len() as u64 * u64::from(MIN_RAYS)))
 }
 
-/// All lines that cross the bounding sphere.
+/// The lines that cross the scene's bounding sphere.
 struct Lines {
     center: Vec3,
     radius: f32,
+    /// Of two independent halves of the lines.
     halves: [Sequence; 2],
 }
 
@@ -96,38 +99,38 @@ impl Lines {
         Self { center, radius, halves }
     }
 
-    /// Rays that a line takes the time of: one, and a part for each surface that it crosses, 2A / A_sphere of every area A on average.
+    /// Time that a line takes, in rays. On average a line crosses 2A / A_sphere surfaces of a total area A.
     fn cost(&self, scene: &BakeScene) -> f64 {
-        const CROSSING: f64 = 0.5;
         let area: f64 =
             scene.triangles.iter().filter(|t| !t.is_hidden_duplicate).map(|t| f64::from(t.area)).sum();
         let sphere = 4.0 * std::f64::consts::PI * f64::from(self.radius).powi(2);
         let crossings = if sphere > 0.0 { 2.0 * area / sphere } else { 0.0 };
-        LINE + CROSSING * crossings
+        LINE_COST + CROSSING_COST * crossings
     }
 
-    /// Line `index` of a half: where it begins, outside the sphere, and its direction. Either direction of a line is the same line: half a
-    /// sphere of them is all.
+    /// Line `index` of a half: where it begins, outside the sphere, and its direction. Opposite directions give the
+    /// same line, so a hemisphere of directions is enough.
     fn line(&self, half: u32, index: u32) -> (Vec3, Vec3) {
         let [u, v, a, b] = self.halves[half as usize].point(index, 0);
         let direction = sphere_direction(0.5 * u, v).normalize_or(Vec3::Z);
         let [x, y] = frame(direction);
         let on_disc = cosine_direction(a, b);
         let across = (x * on_disc.x + y * on_disc.y) * self.radius;
-        // A little outside, so that nothing lies before the line's beginning.
+        // It begins a little outside, so that nothing of the scene lies before its beginning.
         (self.center + across - direction * (1.125 * self.radius), direction)
     }
 
-    /// What stands at both ends of each part of a batch's lines, where one of them is a patch. Batches take turns in the halves.
-    fn parts(&self, scene: &BakeScene, patches: &Patches, batch: u32) -> Vec<(LineEnd, LineEnd)> {
+    /// Both ends of each segment of a batch's lines, if at least one of them is a patch. Even batches are of one half,
+    /// odd ones of the other.
+    fn segments(&self, scene: &BakeScene, patches: &Patches, batch: u32) -> Vec<(LineEnd, LineEnd)> {
         let reach = self.center.length() + self.radius;
-        let mut parts = Vec::with_capacity(2 * BATCH as usize);
+        let mut segments = Vec::with_capacity(2 * BATCH as usize);
         for line in 0..BATCH {
             let (origin, direction) = self.line(batch % 2, batch / 2 * BATCH + line);
             let mut behind = LineEnd::NOTHING;
             let mut add = |a: LineEnd, b: LineEnd| {
                 if a.patch().or(b.patch()).is_some() {
-                    parts.push((a, b));
+                    segments.push((a, b));
                 }
             };
             for crossing in scene.crossings(origin, direction, reach) {
@@ -136,32 +139,34 @@ impl Lines {
             }
             add(behind, LineEnd::NOTHING);
         }
-        parts
+        segments
     }
 }
 
-/// Of a line that meets nothing, in rays.
-const LINE: f64 = 1.0;
+/// Time that a line takes which crosses nothing, and that each crossing adds, in rays.
+const LINE_COST: f64 = 1.0;
+const CROSSING_COST: f64 = 0.5;
 
-/// Both ends of each part count it.
+/// The counts per patch, from the segments of all batches: a segment is a ray from each of its ends.
 fn counts_of(batches: &[Vec<(LineEnd, LineEnd)>], patches: usize) -> Vec<PatchRayCounts> {
-    let mut cast = vec![PatchRayCounts::default(); patches];
+    let mut counts = vec![PatchRayCounts::default(); patches];
     for half in 0..2 {
         let mut hits: Vec<Vec<PatchIndex>> = vec![Vec::new(); patches];
         for &(a, b) in batches.iter().skip(half).step_by(2).flatten() {
             for (from, to) in [(a, b), (b, a)] {
                 let Some(from) = from.patch() else { continue };
-                let own = &mut cast[from.place()];
-                own.count[half] += 1;
+                let counts = &mut counts[from.place()];
+                counts.count[half] += 1;
                 match to {
-                    LineEnd::NOTHING => own.missed[half] += 1,
-                    LineEnd::INSIDE => own.inside[half] += 1,
-                    // What a patch sees of itself across a rounded edge is nothing.
+                    LineEnd::NOTHING => counts.missed[half] += 1,
+                    LineEnd::INSIDE => counts.inside[half] += 1,
+                    // A flat patch cannot see itself; rounding at its edges may say so.
                     _ => hits[from.place()].extend(to.patch().filter(|&patch| patch != from)),
                 }
             }
         }
-        hits.into_par_iter().map(counted).zip(&mut cast).for_each(|(met, own)| own.hits[half] = met);
+        let hits = hits.into_par_iter().map(counted);
+        hits.zip(&mut counts).for_each(|(hits, counts)| counts.hits[half] = hits);
     }
-    cast
+    counts
 }

@@ -1,5 +1,6 @@
-//! Both ways to count form factors: what they cost and what is left of their error, by number of rays, against converged ones. The figures
-//! that docs/decisions.md compares, printed with `--nocapture`.
+//! A study of the two ways to count form factors: their time and their error by number of rays, against converged form
+//! factors. The figures are those that docs/decisions.md compares; `--nocapture` prints them. It is a test as well: the
+//! errors must fall about as 1/√rays, which also means that both methods converge to the same light.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -7,7 +8,7 @@ use std::time::Instant;
 use bevy_ecs::world::World;
 use glam::Vec3;
 
-use super::exchange::patch_direct;
+use super::exchange::{channel_mean, mean_reflectances, patch_direct};
 use super::exchange_tests::{MODELS, model};
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
@@ -28,7 +29,6 @@ const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactor
 /// How good the form factors of one method are.
 #[derive(Clone, Copy, Debug)]
 struct FormFactorErrors {
-    /// How they were counted.
     method: FormFactorMethod,
     /// Rays or lines cast.
     rays: u64,
@@ -40,8 +40,8 @@ struct FormFactorErrors {
     irradiance: f64,
 }
 
-/// The form factors of a world's static objects by both methods with so many rays each, against those of both with `converged` rays.
-/// Patches are as many as `options.quality` asks for.
+/// The errors of the form factors between a world's static objects, by both methods with each number of rays in `rays`,
+/// against those by both methods with `converged` rays. There are as many patches as `options.quality` asks for.
 fn form_factor_errors(
     world: &mut World,
     options: &BakeOptions,
@@ -68,89 +68,96 @@ fn form_factor_errors(
     let direct: Vec<Vec3> = PatchIndex::all(patches.list.len())
         .map(|index| {
             let sequence = Sequence::new(options.seed, Stream::PatchLight(0), index.0);
-            patch_direct(&scene, &sources, &patches, index, references[0].open[index.place()], sequence).0
+            patch_direct(&sources, &patches, index, references[0].open[index.place()], sequence).0
         })
         .collect();
     let irradiance = |factors: &FormFactors| solution(factors, &patches, &direct, sources.sky);
     let expected: Vec<Vec<f64>> = references.iter().map(irradiance).collect();
-    let mut found = Vec::new();
+    let mut errors = Vec::new();
     for method in METHODS {
         for &count in rays {
             let (factors, seconds) = sample(method, count, options.seed)?;
-            let own = irradiance(&factors);
-            // The references' own errors are the same for all.
-            let mean = |of: &dyn Fn(usize) -> f64| (0.5 * (of(0).powi(2) + of(1).powi(2))).sqrt();
-            found.push(FormFactorErrors {
+            let irradiance = irradiance(&factors);
+            // The mean over both references, whose own errors then add the same to the errors of both methods.
+            let mean = |error: &dyn Fn(usize) -> f64| (0.5 * (error(0).powi(2) + error(1).powi(2))).sqrt();
+            errors.push(FormFactorErrors {
                 method,
                 rays: factors.rays,
                 seconds,
-                exchange: mean(&|at| exchange_apart(&factors, &references[at])),
-                irradiance: mean(&|at| irradiance_apart(&own, &expected[at], &references[at])),
+                exchange: mean(&|reference| exchange_error(&factors, &references[reference])),
+                irradiance: mean(&|reference| {
+                    irradiance_error(&irradiance, &expected[reference], &references[reference])
+                }),
             });
         }
     }
-    Ok(found)
+    Ok(errors)
 }
 
 #[test]
-fn cosine_rays_and_global_lines_converge_to_the_same() {
+fn cosine_rays_and_global_lines_converge_to_the_same_light() {
     for name in MODELS {
         let Some(mut world) = model(name) else { continue };
         let options =
             BakeOptions { density: Density::MapSize(16), quality: Quality::Draft, ..BakeOptions::default() };
         let rows = form_factor_errors(&mut world, &options, &[150_000, 2_400_000], 4_000_000).unwrap();
         for method in METHODS {
-            let own: Vec<_> = rows.iter().filter(|row| row.method == method).collect();
-            for row in &own {
+            let rows: Vec<_> = rows.iter().filter(|row| row.method == method).collect();
+            for row in &rows {
                 let [exchange, irradiance] = [row.exchange, row.irradiance].map(|share| 100.0 * share);
                 println!(
                     "{name} {method:?}: {} rays, {:.3} s, exchange {exchange:.2} % off, irradiance {irradiance:.3} %",
                     row.rays, row.seconds
                 );
             }
-            // Against the mean of both: sixteen times the rays, a quarter of the noise, but for what the references have themselves.
-            let rays = own[1].rays as f64 / own[0].rays as f64;
-            let gain = own[0].irradiance / own[1].irradiance;
-            assert!(gain > 0.55 * rays.sqrt(), "{name} {method:?}: {gain} by {rays} times the rays: {own:?}");
+            // Sixteen times the rays give a quarter of the noise, except for the references' own noise.
+            let rays = rows[1].rays as f64 / rows[0].rays as f64;
+            let gain = rows[0].irradiance / rows[1].irradiance;
+            assert!(
+                gain > 0.55 * rays.sqrt(),
+                "{name} {method:?}: {gain} by {rays} times the rays: {rows:?}"
+            );
         }
     }
 }
 
-/// Irradiance by bounces and by the sky of each patch, mean of the channels.
+/// Irradiance of each patch by bounces and by the sky, mean of the channels.
 fn solution(factors: &FormFactors, patches: &Patches, direct: &[Vec3], sky: Vec3) -> Vec<f64> {
-    let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
-    let reflectance: Vec<f64> = patches.list.iter().map(|patch| grey(patch.reflectance)).collect();
-    let sky: Vec<f64> = factors.sky.iter().map(|&share| f64::from(share) * grey(sky)).collect();
-    let emission: Vec<f64> = (0..direct.len()).map(|i| reflectance[i] * (grey(direct[i]) + sky[i])).collect();
+    let reflectance = mean_reflectances(&patches.list);
+    let sky: Vec<f64> = factors.sky.iter().map(|&share| f64::from(share) * channel_mean(sky)).collect();
+    let emission: Vec<f64> =
+        (0..direct.len()).map(|i| reflectance[i] * (channel_mean(direct[i]) + sky[i])).collect();
     let solved = Solver::default().solve(factors, &reflectance, &emission, 1e-8);
     gather(factors, &solved.radiosity).iter().zip(sky).map(|(bounced, sky)| bounced + sky).collect()
 }
 
-/// |G - G*| / |G*|, over all entries of either.
-fn exchange_apart(found: &FormFactors, expected: &FormFactors) -> f64 {
-    let (mut apart, mut all) = (0.0, 0.0);
+/// |G - G*| / |G*| in the Frobenius norm, where G* is `expected`.
+fn exchange_error(factors: &FormFactors, expected: &FormFactors) -> f64 {
+    let (mut squared_error, mut squared_norm) = (0.0, 0.0);
     for i in PatchIndex::all(expected.len()) {
-        let mut own = found.row(i).peekable();
-        for (j, g) in expected.row(i) {
-            while let Some((_, other)) = own.next_if(|&(k, _)| k < j) {
-                apart += other * other;
+        let mut row = factors.row(i).peekable();
+        for (j, expected) in expected.row(i) {
+            // Entries that only `factors` has.
+            while let Some((_, g)) = row.next_if(|&(k, _)| k < j) {
+                squared_error += g * g;
             }
-            let other = own.next_if(|&(k, _)| k == j).map_or(0.0, |(_, other)| other);
-            apart += (other - g).powi(2);
-            all += g * g;
+            let g = row.next_if(|&(k, _)| k == j).map_or(0.0, |(_, g)| g);
+            squared_error += (g - expected).powi(2);
+            squared_norm += expected * expected;
         }
-        apart += own.map(|(_, other)| other * other).sum::<f64>();
+        squared_error += row.map(|(_, g)| g * g).sum::<f64>();
     }
-    if all > 0.0 { (apart / all).sqrt() } else { 0.0 }
+    if squared_norm > 0.0 { (squared_error / squared_norm).sqrt() } else { 0.0 }
 }
 
-fn irradiance_apart(found: &[f64], expected: &[f64], factors: &FormFactors) -> f64 {
-    let (mut apart, mut all, mut area) = (0.0, 0.0, 0.0);
-    for ((found, expected), &own) in found.iter().zip(expected).zip(&factors.areas) {
-        let own = f64::from(own);
-        apart += own * (found - expected).powi(2);
-        all += own * expected;
-        area += own;
+/// RMSE of irradiances, weighted by area, relative to their mean.
+fn irradiance_error(irradiance: &[f64], expected: &[f64], factors: &FormFactors) -> f64 {
+    let (mut squared_error, mut flux, mut total_area) = (0.0, 0.0, 0.0);
+    for ((irradiance, expected), &area) in irradiance.iter().zip(expected).zip(&factors.areas) {
+        let area = f64::from(area);
+        squared_error += area * (irradiance - expected).powi(2);
+        flux += area * expected;
+        total_area += area;
     }
-    if all > 0.0 { (apart / area).sqrt() * area / all } else { 0.0 }
+    if flux > 0.0 { (squared_error / total_area).sqrt() * total_area / flux } else { 0.0 }
 }

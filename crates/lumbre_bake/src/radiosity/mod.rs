@@ -1,5 +1,5 @@
-//! Patches, the form factors between them, and the linear system that says how much light each one sends. Not the light of texels, which
-//! `final_gather` computes from it.
+//! Patches, the form factors between them, and the linear system whose solution is the light that leaves each of them.
+//! The light of texels is computed from it in `final_gather`.
 
 pub(crate) mod bsp;
 pub(crate) mod components;

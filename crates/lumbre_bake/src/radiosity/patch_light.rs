@@ -1,5 +1,6 @@
-//! Direct light of the patches by that of the texels that lie on them: those have it already, and more exactly than a few rays of the
-//! patch's own would find it. Not of patches that too few texels tell of: those cast rays (`exchange`).
+//! Direct light of patches as the mean of the direct light of the texels on them, which is known already, and more
+//! accurately than from a few shadow rays of the patch. Patches with too few texels cast shadow rays instead, in
+//! `exchange`.
 
 use glam::{DVec3, Vec2, Vec3};
 
@@ -10,11 +11,13 @@ use crate::direct_light::DirectLight;
 use crate::scene::BakeScene;
 use crate::scene::material::Side;
 
-/// Fewest texels that tell a patch's light, in each half of them: of fewer, too much lies across its border.
-const FEWEST: f64 = 2.0;
+/// Fewest texels that a patch's light is computed from, in each half of them. The share of fewer texels that lies
+/// beyond the patch's border would be too large.
+const MIN_TEXELS: f64 = 2.0;
 
-/// Mean direct irradiance of each patch, mixed lights included, by either half of its texels: the fields of a chessboard. `None` where there
-/// are too few of them. Texels that walls divide hold the light of both sides, and so tell of neither.
+/// Mean direct irradiance of each patch, mixed lights included, by two halves of its texels, the fields of a
+/// chessboard. `None` where there are too few texels. Texels that walls divide are left out, since they hold the light
+/// of both sides of the wall.
 pub(crate) fn patch_light(
     scene: &BakeScene,
     texels: &CoveredTexels<'_>,
@@ -24,8 +27,8 @@ pub(crate) fn patch_light(
     let mut divided = vec![false; texels.list.len()];
     texels.divided.iter().for_each(|texel| divided[texel.place()] = true);
     let mut sums = vec![[(DVec3::ZERO, 0.0f64); 2]; patches.list.len()];
-    let told = texels.list.iter().zip(&direct.texels).zip(divided).filter(|(_, divided)| !divided);
-    for ((texel, direct), _) in told {
+    let undivided = texels.list.iter().zip(&direct.texels).zip(divided).filter(|(_, divided)| !divided);
+    for ((texel, direct), _) in undivided {
         let (half, light) = (((texel.x + texel.y) & 1) as usize, direct.total().as_dvec3());
         for_each_point(scene, texel, |triangle, at, share| {
             if let Some(patch) = patches.at(triangle, Side::Front, at) {
@@ -36,13 +39,14 @@ pub(crate) fn patch_light(
         });
     }
     let mean = |halves: [(DVec3, f64); 2]| {
-        let enough = halves.iter().all(|(_, weight)| *weight >= FEWEST);
-        enough.then(|| halves.map(|(sum, weight)| (sum / weight).as_vec3()))
+        let has_enough = halves.iter().all(|(_, weight)| *weight >= MIN_TEXELS);
+        has_enough.then(|| halves.map(|(sum, weight)| (sum / weight).as_vec3()))
     };
     sums.into_iter().map(mean).collect()
 }
 
-/// Evenly spread points of what a texel shows: the triangle, barycentric weights, and the share of the texel that it stands for.
+/// Calls `visit` with evenly spread points of the surface that a texel shows: the triangle, barycentric weights, and
+/// the share of the texel that the point stands for.
 fn for_each_point(scene: &BakeScene, texel: &Texel, mut visit: impl FnMut(u32, (f32, f32), f64)) {
     match &texel.footprint {
         Footprint::Whole(triangle) => {
@@ -55,7 +59,7 @@ fn for_each_point(scene: &BakeScene, texel: &Texel, mut visit: impl FnMut(u32, (
                 }
             }
         }
-        // At most a texel together: of few points each is less.
+        // Together they count for one texel at most; few points cover only a part of it.
         Footprint::Points(points) => {
             let share = 1.0 / points.len().max(16) as f64;
             points.iter().for_each(|point| visit(point.triangle, point.at, share));
@@ -83,9 +87,10 @@ mod tests {
     use crate::sources::light_sources::Sources;
     use crate::{BakeOptions, BakeReport, Density};
 
-    /// A block stands in a room under a lamp: what texels tell of its patches is what 1,024 rays to the lamp find from each.
+    /// For a block in a room under a lamp, the light of patches by texels agrees with that by 1,024 rays to the lamp
+    /// from each patch.
     #[test]
-    fn texels_tell_what_rays_from_the_patch_find() {
+    fn light_by_texels_agrees_with_light_by_shadow_rays() {
         let mut room = shapes::cuboid(Vec3::new(4.0, 3.0, 4.0), 2);
         room.indices.chunks_exact_mut(3).for_each(|corners| corners.swap(1, 2));
         room.normals.iter_mut().for_each(|normal| *normal = -*normal);
@@ -107,26 +112,26 @@ mod tests {
         let texels = CoveredTexels::new(&scene, &layout, &mut monitor, &mut report).unwrap();
         let direct = direct_light(&sources, &texels, &[], &options, &mut monitor, &mut report).unwrap();
         let patches = Patches::new(&scene, 6.0 * texels.side);
-        let told = patch_light(&scene, &texels, &direct, &patches);
+        let light = patch_light(&scene, &texels, &direct, &patches);
 
         let (mut known, mut squares, mut sum) = (0.0, 0.0, 0.0);
-        for (index, (patch, told)) in patches.list.iter().zip(&told).enumerate() {
-            let Some(halves) = told else { continue };
+        for (index, (patch, light)) in patches.list.iter().zip(&light).enumerate() {
+            let Some(halves) = light else { continue };
             let point = |x: f32, y: f32| {
                 let (triangle, at) = (patch.triangle, patches.point(patch, triangle_point(x, y)));
                 Some(receiver(&scene, &FootprintPoint { triangle, at, offset: Vec2::ZERO }))
             };
             let sequence = Sequence::new(1, Stream::Test(92), index as u32);
             let expected = sources.irradiance(sequence, 1024, &point).total().x;
-            let found = 0.5 * (halves[0].x + halves[1].x);
+            let mean = 0.5 * (halves[0].x + halves[1].x);
             known += 1.0;
-            squares += (found - expected).powi(2);
+            squares += (mean - expected).powi(2);
             sum += expected;
         }
         let relative = (squares / known).sqrt() / (sum / known);
-        println!("{known} of {} patches, {:.2} % apart", told.len(), 100.0 * relative);
-        assert!(known > 0.8 * told.len() as f32, "{known} of {}", told.len());
-        // What the border's texels have of the patch beside it: a shadow's edge that lies there.
+        println!("{known} of {} patches, {:.2} % apart", light.len(), 100.0 * relative);
+        assert!(known > 0.8 * light.len() as f32, "{known} of {}", light.len());
+        // Texels on the border hold light of the adjacent patch, which differs where a shadow's edge lies.
         assert!(relative < 0.03, "{relative}");
     }
 }

@@ -1,4 +1,4 @@
-//! Patches of a floor that a wall stands on, and that something lies on.
+//! Tests of the patches of a floor that a wall stands on or that something lies on, and of patches with textures.
 
 use std::sync::Arc;
 
@@ -14,34 +14,37 @@ use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::BakeScene;
 use crate::scene::material::Side;
 
-/// The floor's patches as they are, and as points find them.
-fn check(objects: &[&[[Vec3; 3]]], side: f32, apart: impl Fn(Vec3) -> u32) {
+/// Checks that the patches cover all surfaces, that each point of a patch is found in it, and that no patch of the
+/// floor (the first object) lies on both sides of a contact line; `side_of_line` returns different numbers for the
+/// sides.
+fn check(objects: &[&[[Vec3; 3]]], side: f32, side_of_line: impl Fn(Vec3) -> u32) {
     let scene = scene(objects);
     let patches = Patches::new(&scene, side);
     assert_eq!(patches.list.len() as u64, Patches::count(&scene, side));
     let area: f32 = patches.list.iter().map(|patch| patch.area).sum();
     let expected: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     assert!((area / expected - 1.0).abs() < 1e-5, "{area} {expected}");
-    let place = |position: Vec3| apart(scene.space.world(position).as_vec3());
+    let side_of_line = |position: Vec3| side_of_line(scene.space.world(position).as_vec3());
+    // Area of the floor that lies beyond a line which crosses its patch.
     let mut crossed = 0.0;
     for (index, patch) in PatchIndex::all(patches.list.len()).zip(&patches.list) {
         let sequence = Sequence::new(1, Stream::Test(2), index.0);
-        let mut places = Vec::new();
+        let mut sides = Vec::new();
         for sample in 0..64 {
             let [x, y, ..] = sequence.point(sample, 0);
-            // Off the borders, where rounding may decide.
+            // Away from the patch's edges, where the result depends on rounding.
             let (u, v) = triangle_point(x, y);
             let (u, v) = (0.02 + 0.94 * u, 0.02 + 0.94 * v);
             let at = patches.point(patch, (u, v));
             assert_eq!(patches.at(patch.triangle, patch.side, at), Some(index), "{patch:?} {at:?}");
-            places.push(place(scene.triangles[patch.triangle as usize].position(at.0, at.1)));
+            sides.push(side_of_line(scene.triangles[patch.triangle as usize].position(at.0, at.1)));
         }
         if patch.triangle < 2 && patch.side == Side::Front {
-            let ones = places.iter().filter(|&&place| place == places[0]).count();
-            crossed += patch.area * ones.min(places.len() - ones) as f32 / places.len() as f32;
+            let same = sides.iter().filter(|&&side| side == sides[0]).count();
+            crossed += patch.area * same.min(sides.len() - same) as f32 / sides.len() as f32;
         }
     }
-    // Pieces of less than 1/256 of a cell stay with their neighbours.
+    // Pieces smaller than 1/256 of a cell are not cut off.
     assert!(crossed < 0.001 * expected, "{crossed} of {expected} in patches on both sides");
 }
 
@@ -51,22 +54,23 @@ fn no_patch_lies_on_both_sides_of_a_wall() {
     for x in [0.3, 0.731, 1.9] {
         let wall = square([x, 0.0, 0.0], Vec3::Z * 2.0, Vec3::Y);
         check(&[&floor, &wall], 0.4, |p| u32::from(p.x > x));
-        // It may pass through the floor, too.
+        // The wall may also pass through the floor.
         let sunk = square([x, -0.5, 0.0], Vec3::Z * 2.0, Vec3::Y);
         check(&[&floor, &sunk], 0.4, |p| u32::from(p.x > x));
     }
 }
 
 #[test]
-fn no_patch_lies_half_under_a_thing() {
+fn no_patch_lies_partly_under_an_object() {
     let floor = square([0.0; 3], Vec3::Z * 2.0, Vec3::X * 2.0);
-    // A sheet a little above, whose own patches are of no interest.
+    // A sheet a little above the floor.
     let sheet = square([0.35, 0.01, 0.45], Vec3::X, Vec3::Z);
-    let under = |p: Vec3| p.y < 0.005 && (0.35..1.35).contains(&p.x) && (0.45..1.45).contains(&p.z);
-    check(&[&floor, &sheet], 0.4, |p| u32::from(under(p)));
+    let is_under = |p: Vec3| p.y < 0.005 && (0.35..1.35).contains(&p.x) && (0.45..1.45).contains(&p.z);
+    check(&[&floor, &sheet], 0.4, |p| u32::from(is_under(p)));
 }
 
-/// A square of two triangles whose texture of 64 x 64 texels is white where `is_white` says, and black elsewhere.
+/// A square of two triangles with a texture of 64 x 64 texels that is white where `is_white` returns true, and black
+/// elsewhere.
 fn textured(is_white: impl Fn(u32, u32) -> bool) -> BakeScene {
     let mut scene = scene(&[&square([0.0; 3], Vec3::Z * 2.0, Vec3::X * 2.0)]);
     let rgba = (0..64 * 64).flat_map(|at| [if is_white(at % 64, at / 64) { 255 } else { 0 }; 4]).collect();
@@ -88,8 +92,9 @@ fn textured(is_white: impl Fn(u32, u32) -> bool) -> BakeScene {
 }
 
 #[test]
-fn a_patch_reflects_what_its_texels_do_on_average() {
-    // One patch a triangle, then some. The four points at which textures used to be read lie at 1/6, 1/3 and 2/3 of the patches.
+fn a_patch_reflects_the_mean_of_its_texels() {
+    // Sides that give one patch per triangle, and then several. The spots and stripes are missed by an average of a few
+    // points only.
     let spots = |x: u32, y: u32| (28..32).contains(&x) && (3..7).contains(&y);
     let stripes = |x: u32, _: u32| x.is_multiple_of(8);
     let checker = |x: u32, y: u32| (x + y).is_multiple_of(2);
@@ -97,21 +102,17 @@ fn a_patch_reflects_what_its_texels_do_on_average() {
         let scene = textured(is_white);
         let patches = Patches::new(&scene, side * scene.space.scale as f32);
         let white = (0..64 * 64).filter(|at| is_white(at % 64, at / 64)).count() as f64 / (64.0 * 64.0);
-        let found = patches.mean_reflectance();
-        assert!(
-            (found / (0.8 * white) - 1.0).abs() < 0.02,
-            "{} patches: {found} {white}",
-            patches.list.len()
-        );
+        let mean = patches.mean_reflectance();
+        assert!((mean / (0.8 * white) - 1.0).abs() < 0.02, "{} patches: {mean} {white}", patches.list.len());
         patches
     };
     for side in [9.0, 0.5, 0.1] {
         for is_white in [&spots as &dyn Fn(u32, u32) -> bool, &stripes, &checker] {
             let patches = check(is_white, side);
-            // 91 texels along a whole triangle's diagonal are more than it has points.
-            let named =
+            // A whole triangle has 91 texels along its diagonal, more than the most points along an edge.
+            let warnings =
                 patches.warnings.iter().filter(|warning| warning.contains("texels of its textures")).count();
-            assert_eq!(named, usize::from(side > 1.0), "{:?}", patches.warnings);
+            assert_eq!(warnings, usize::from(side > 1.0), "{:?}", patches.warnings);
         }
     }
 }

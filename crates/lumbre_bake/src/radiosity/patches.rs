@@ -1,6 +1,6 @@
-//! Patches: the pieces of surface over which radiosity is constant. Each triangle is cut into n² equal cells, so that a
-//! ray's hit finds its own by arithmetic; cells that other surfaces stand on or pass through are cut further along those.
-//! Not their light: that is `form_factors` and `solver`.
+//! Patches: the pieces of surface over which radiosity is constant. Each triangle is divided into n² equal cells, so
+//! that the patch at a ray's hit is found by arithmetic; cells that other surfaces stand on or pass through are cut
+//! further along those contact lines. The light of patches is computed in `form_factors` and `solver`.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -22,7 +22,8 @@ use crate::scene::{BakeScene, SceneTriangle};
 pub(crate) struct Patch {
     pub triangle: u32,
     pub side: Side,
-    /// Which piece of its triangle: a cell's row and place in it, or with the highest bit a piece of one.
+    /// Which piece of the triangle this is: a whole cell as [`packed`] stores it or, with [`PIECE_FLAG`] set, the index
+    /// of a piece of a cut cell.
     cell: u32,
     /// Square canonical units.
     pub area: f32,
@@ -30,222 +31,261 @@ pub(crate) struct Patch {
     pub reflectance: Vec3,
 }
 
-/// Where the patches of a triangle are in the list.
+/// Where the patches of one triangle are in the list of all patches.
 #[derive(Clone, Copy, Debug)]
-struct Cut {
-    /// Pieces along each edge; 0 for a triangle that light does not meet.
+struct TrianglePatches {
+    /// Cells along each edge; 0 for a triangle that receives no light.
     divisions: u32,
+    /// The first patch of the front, and of the back of a two-sided triangle.
     front: PatchIndex,
     back: Option<PatchIndex>,
-    /// Of the front's first patch and the back's: of all, where it does not vary.
-    reflectance: [Vec3; 2],
-    varies: bool,
-    /// Where the trees of its cells are listed; [`UNCUT`] if none is cut.
+    /// Reflectance of the front and of the back; `None` where it varies over the triangle.
+    reflectance: Option<[Vec3; 2]>,
+    /// Where the tree roots of its cells begin in [`Patches::roots`]; [`UNCUT`] if none of its cells is cut.
     roots: u32,
 }
 
-/// Share of a cell that a piece of it has at least.
-const MIN_PIECE: f32 = 1e-6;
-/// Of a cell, or of all of a triangle's: no line goes through.
-const UNCUT: u32 = u32::MAX;
-/// Marks a piece of a cell.
-const PIECE: u32 = 1 << 31;
-/// Where in a patch's cell the row begins; both it and the place in it are below 2^11, as a triangle has at most 1024 divisions.
-const ROW: u32 = 16;
+impl TrianglePatches {
+    /// Of a triangle that receives no light.
+    const NONE: Self = Self {
+        divisions: 0,
+        front: PatchIndex(0),
+        back: None,
+        reflectance: Some([Vec3::ZERO; 2]),
+        roots: UNCUT,
+    };
+}
 
-/// All patches, and the way from a point to its patch.
+/// Smallest area of a piece, as a share of its cell's.
+const MIN_PIECE_SHARE: f32 = 1e-6;
+/// In place of a tree's root: no line cuts the cell, or any cell of the triangle.
+const UNCUT: u32 = u32::MAX;
+/// Marks the number of a piece of a cut cell, as opposed to that of a whole cell.
+const PIECE_FLAG: u32 = 1 << 31;
+/// Bit of [`Patch::cell`] at which the row begins. The row and the place in it are both below 2^11, as a triangle has
+/// at most 1024 divisions.
+const ROW_SHIFT: u32 = 16;
+
+/// All patches of a scene, and the structures that find the patch at a point.
 #[derive(Clone, Debug)]
 pub(crate) struct Patches {
     pub list: Vec<Patch>,
-    cuts: Vec<Cut>,
-    /// Of each cell of each triangle that has some cut: its tree, or [`UNCUT`].
+    triangles: Vec<TrianglePatches>,
+    /// For each cell of each triangle with cut cells: the root of the cell's tree, or [`UNCUT`].
     roots: Vec<u32>,
-    lines: BspTrees,
-    /// What is coarser than it should be, in words.
+    trees: BspTrees,
+    /// Where patches are coarser than they should be, for the report.
     pub warnings: Vec<String>,
 }
 
-/// Points along a patch's edge at which textures are averaged: one for each texel, so that bilinear filtering leaves none out, but not more than
-/// so many.
-const TEXTURE_POINTS: u32 = 64;
+/// Most points along a patch's edge at which textures are averaged. Up to that there is one per texel, so that bilinear
+/// filtering misses none.
+const MAX_TEXTURE_POINTS: u32 = 64;
 
 impl Patches {
-    /// By area, mean of the channels, at most .999.
+    /// The mean of all patches, weighted by area, of the channels' mean; at most 0.999.
     pub fn mean_reflectance(&self) -> f64 {
-        let (sum, area) = self.list.iter().fold((0.0, 0.0), |(sum, area), patch| {
-            let own = f64::from(patch.area);
-            (sum + own * f64::from(patch.reflectance.element_sum()) / 3.0, area + own)
+        let (sum, area) = self.list.iter().fold((0.0, 0.0), |(sum, total), patch| {
+            let area = f64::from(patch.area);
+            (sum + area * f64::from(patch.reflectance.element_sum()) / 3.0, total + area)
         });
         if area > 0.0 { (sum / area).clamp(0.0, 0.999) } else { 0.0 }
     }
 
-    /// How many [`Patches::new`] would make.
+    /// How many patches [`Patches::new`] would make, without the memory that they take.
     pub fn count(scene: &BakeScene, side: f32) -> u64 {
-        let mut lines = BspTrees::default();
-        let met = scene.triangles.iter().enumerate().filter(|(_, triangle)| !triangle.is_hidden_duplicate);
-        let met = met.take_while(|_| !scene.stop.is_cancelled());
-        met.map(|(index, triangle)| {
-            let divisions = divisions(triangle, side);
-            let cut = cut_cells(scene, index, divisions, side, &mut lines);
-            let more: u64 = cut.iter().map(|(_, cut)| u64::from(cut.count - 1)).sum();
-            (u64::from(divisions).pow(2) + more) * (1 + u64::from(triangle.two_sided))
+        let mut trees = BspTrees::default();
+        let lit = scene.triangles.iter().enumerate().filter(|(_, triangle)| !triangle.is_hidden_duplicate);
+        let lit = lit.take_while(|_| !scene.stop.is_cancelled());
+        lit.map(|(index, triangle)| {
+            let cells = TriangleCells::new(scene, index, side, &mut trees);
+            cells.patches_per_side() * (1 + u64::from(triangle.two_sided))
         })
         .sum()
     }
 
-    /// BspTrees every triangle into patches of about `side` canonical units.
+    /// Divides every triangle into patches of about `side` canonical units.
     pub fn new(scene: &BakeScene, side: f32) -> Self {
         let mut patches = Self::outlines(scene, side);
-        let of_patch = |patch: &Patch| {
-            if scene.stop.is_cancelled() {
-                return (Vec3::ZERO, 0.0);
-            }
-            let corners = CORNERS.map(|at| patches.point(patch, at));
-            mean_reflectance(scene, patch.triangle as usize, patch.side, &corners)
-        };
-        let found: Vec<(Vec3, f32)> = patches.list.par_iter().map(of_patch).collect();
-        // Of each object, the most texels along a patch's edge.
-        let mut texels: BTreeMap<u32, f32> = BTreeMap::new();
-        for (patch, (reflectance, along)) in patches.list.iter_mut().zip(found) {
-            patch.reflectance = reflectance;
-            if along > TEXTURE_POINTS as f32 {
-                let most = texels.entry(scene.triangles[patch.triangle as usize].object).or_default();
-                *most = most.max(along);
-            }
-        }
-        for cut in patches.cuts.iter_mut().filter(|cut| cut.divisions > 0) {
-            let first = |patch: PatchIndex| patches.list[patch.place()].reflectance;
-            cut.reflectance = [first(cut.front), cut.back.map_or(Vec3::ZERO, first)];
-        }
-        let coarse = texels.into_iter().map(|(object, most)| {
-            format!(
-                "{}: a patch of it shows up to {most:.0} texels of its textures along an edge; what bounces off it is the mean of \
-                 {TEXTURE_POINTS} points along there, which may miss what is smaller",
-                scene.names[object as usize]
-            )
-        });
-        patches.warnings.extend(coarse);
+        patches.find_reflectances(scene);
         patches
     }
 
-    /// The same, of which nobody asks what they reflect.
+    /// As [`Patches::new`], but without reflectances: all of them are 0.
     pub fn outlines(scene: &BakeScene, side: f32) -> Self {
-        let mut lines = BspTrees::default();
-        let (mut list, mut cuts) = (Vec::new(), Vec::with_capacity(scene.triangles.len()));
-        let mut roots = Vec::new();
-        let mut full: BTreeMap<u32, usize> = BTreeMap::new();
+        let mut patches = Self {
+            list: Vec::new(),
+            triangles: Vec::with_capacity(scene.triangles.len()),
+            roots: Vec::new(),
+            trees: BspTrees::default(),
+            warnings: Vec::new(),
+        };
+        // Per object, how many of its cells more lines cross than may cut them.
+        let mut full_cells: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, triangle) in scene.triangles.iter().enumerate() {
             if triangle.is_hidden_duplicate || scene.stop.is_cancelled() {
-                cuts.push(Cut {
-                    divisions: 0,
-                    front: PatchIndex(0),
-                    back: None,
-                    reflectance: [Vec3::ZERO; 2],
-                    varies: false,
-                    roots: UNCUT,
-                });
+                patches.triangles.push(TrianglePatches::NONE);
                 continue;
             }
-            let divisions = divisions(triangle, side);
-            let cells = divisions * divisions;
-            let before = lines.full;
-            let cut = cut_cells(scene, index, divisions, side, &mut lines);
-            if lines.full > before {
-                *full.entry(triangle.object).or_default() += lines.full - before;
+            let full_before = patches.trees.full;
+            let cells = TriangleCells::new(scene, index, side, &mut patches.trees);
+            if patches.trees.full > full_before {
+                *full_cells.entry(triangle.object).or_default() += patches.trees.full - full_before;
             }
-            let own_roots = if cut.is_empty() { UNCUT } else { roots.len() as u32 };
-            if !cut.is_empty() {
-                roots.resize(roots.len() + cells as usize, UNCUT);
-                for (cell, cut) in &cut {
-                    roots[(own_roots + cell) as usize] = cut.root;
-                }
-            }
-            let mut add = |side: Side| {
-                let first = PatchIndex::new(list.len());
-                let patch = |cell: u32| {
-                    let corners = corners_of(&lines, divisions, cell);
-                    let area = match cell & PIECE {
-                        0 => triangle.area / cells as f32,
-                        // Of a very fine cell's piece the corners may fall together: no patch is without area.
-                        _ => triangle.area * share(&corners).max(MIN_PIECE / cells as f32),
-                    };
-                    let (cell, reflectance) = (packed(divisions, cell), Vec3::ZERO);
-                    Patch { triangle: index as u32, side, cell, area, reflectance }
-                };
-                list.extend((0..cells).map(patch));
-                for (cell, cut) in &cut {
-                    let mut pieces = (cut.first..cut.first + cut.count).map(|piece| patch(PIECE | piece));
-                    if let Some(own) = pieces.next() {
-                        list[first.place() + *cell as usize] = own;
-                    }
-                    list.extend(pieces);
-                }
-                first
-            };
-            let front = add(Side::Front);
-            let back = triangle.two_sided.then(|| add(Side::Back));
-            let reflectance = [Vec3::ZERO; 2];
-            let varies = scene.surfaces[triangle.surface as usize].varies();
-            cuts.push(Cut { divisions, front, back, reflectance, varies, roots: own_roots });
+            patches.push_triangle(scene, index, &cells);
         }
-        let crossed = full.into_iter().map(|(object, count)| {
+        let warning = |(object, count): (u32, usize)| {
             format!(
                 "{}: more surfaces stand on {count} of its cells than patches are cut along; light that bounces off there mixes between \
                  what they divide",
                 scene.names[object as usize]
             )
-        });
-        let warnings = crossed.collect();
-        Self { list, cuts, roots, lines, warnings }
+        };
+        patches.warnings = full_cells.into_iter().map(warning).collect();
+        patches
     }
 
-    /// The patch at a point of a triangle's side; none where light does not arrive.
+    /// Appends the patches of a triangle.
+    fn push_triangle(&mut self, scene: &BakeScene, index: usize, cells: &TriangleCells) {
+        let triangle = &scene.triangles[index];
+        let roots = self.push_roots(cells);
+        let front = self.push_side(triangle, (index, Side::Front), cells);
+        let back = triangle.two_sided.then(|| self.push_side(triangle, (index, Side::Back), cells));
+        let varies = scene.surfaces[triangle.surface as usize].varies();
+        let reflectance = (!varies).then_some([Vec3::ZERO; 2]);
+        let divisions = cells.divisions;
+        self.triangles.push(TrianglePatches { divisions, front, back, reflectance, roots });
+    }
+
+    /// Appends the tree roots of a triangle's cells if any of them is cut; returns where they begin, or [`UNCUT`].
+    fn push_roots(&mut self, cells: &TriangleCells) -> u32 {
+        if cells.cut.is_empty() {
+            return UNCUT;
+        }
+        let first = self.roots.len();
+        self.roots.resize(first + cells.count() as usize, UNCUT);
+        for (cell, cut) in &cells.cut {
+            self.roots[first + *cell as usize] = cut.root;
+        }
+        first as u32
+    }
+
+    /// Appends the patches of one side of a triangle; returns the first. A patch's place after the first is its slot in
+    /// the trees: a cut cell's first piece takes the place of the cell, and its other pieces follow after all cells.
+    fn push_side(
+        &mut self,
+        triangle: &SceneTriangle,
+        (index, side): (usize, Side),
+        cells: &TriangleCells,
+    ) -> PatchIndex {
+        let Self { list, trees, .. } = self;
+        let (divisions, count) = (cells.divisions, cells.count());
+        let first = PatchIndex::new(list.len());
+        let patch = |cell: u32| {
+            let area = match cell & PIECE_FLAG {
+                0 => triangle.area / count as f32,
+                // The corners of a very fine cell's piece may coincide by rounding, but no patch may have zero area.
+                _ => {
+                    let corners = &trees.pieces[(cell & !PIECE_FLAG) as usize];
+                    triangle.area * area_share(corners).max(MIN_PIECE_SHARE / count as f32)
+                }
+            };
+            let (cell, reflectance) = (packed(divisions, cell), Vec3::ZERO);
+            Patch { triangle: index as u32, side, cell, area, reflectance }
+        };
+        list.extend((0..count).map(patch));
+        for (cell, cut) in &cells.cut {
+            let mut pieces = (cut.first..cut.first + cut.count).map(|piece| patch(PIECE_FLAG | piece));
+            if let Some(first_piece) = pieces.next() {
+                list[first.place() + *cell as usize] = first_piece;
+            }
+            list.extend(pieces);
+        }
+        first
+    }
+
+    /// Finds what each patch reflects, and warns of textures that are too fine for the patches.
+    fn find_reflectances(&mut self, scene: &BakeScene) {
+        let of_patch = |patch: &Patch| {
+            if scene.stop.is_cancelled() {
+                return (Vec3::ZERO, 0.0);
+            }
+            let corners = CORNERS.map(|at| self.point(patch, at));
+            reflectance_and_texels(scene, patch.triangle as usize, patch.side, &corners)
+        };
+        let results: Vec<(Vec3, f32)> = self.list.par_iter().map(of_patch).collect();
+        // Per object with a patch that shows more texels than there are points, the most texels along a patch's edge.
+        let mut most_texels: BTreeMap<u32, f32> = BTreeMap::new();
+        for (patch, (reflectance, texels)) in self.list.iter_mut().zip(results) {
+            patch.reflectance = reflectance;
+            if texels > MAX_TEXTURE_POINTS as f32 {
+                let most = most_texels.entry(scene.triangles[patch.triangle as usize].object).or_default();
+                *most = most.max(texels);
+            }
+        }
+        let list = &self.list;
+        for triangle in self.triangles.iter_mut().filter(|triangle| triangle.divisions > 0) {
+            let reflectance = |patch: PatchIndex| list[patch.place()].reflectance;
+            if let Some(sides) = &mut triangle.reflectance {
+                *sides = [reflectance(triangle.front), triangle.back.map_or(Vec3::ZERO, reflectance)];
+            }
+        }
+        self.warnings.extend(most_texels.into_iter().map(|(object, most)| {
+            format!(
+                "{}: a patch of it shows up to {most:.0} texels of its textures along an edge; what bounces off it is the mean of \
+                 {MAX_TEXTURE_POINTS} points along there, which may miss what is smaller",
+                scene.names[object as usize]
+            )
+        }));
+    }
+
+    /// The patch at a point of a triangle's side, given by barycentric weights; `None` where no light is received.
     pub fn at(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Option<PatchIndex> {
-        let cut = &self.cuts[triangle as usize];
-        if cut.divisions == 0 {
+        let triangle = &self.triangles[triangle as usize];
+        if triangle.divisions == 0 {
             return None;
         }
         let first = match side {
-            Side::Front => cut.front,
-            Side::Back => cut.back?,
+            Side::Front => triangle.front,
+            Side::Back => triangle.back?,
         };
-        let cell = cell_at(cut.divisions, u, v);
-        if cut.roots != UNCUT {
-            let root = self.roots[(cut.roots + cell) as usize];
+        let cell = cell_at(triangle.divisions, u, v);
+        if triangle.roots != UNCUT {
+            let root = self.roots[(triangle.roots + cell) as usize];
             if root != UNCUT {
-                return Some(PatchIndex(first.0 + self.lines.find(root, u, v)));
+                return Some(PatchIndex(first.0 + self.trees.find(root, u, v)));
             }
         }
         Some(PatchIndex(first.0 + cell))
     }
 
-    /// Reflectance of a triangle's side, if it has the same all over.
+    /// Reflectance of a triangle's side; `None` if it varies over the triangle.
     pub fn reflectance(&self, triangle: u32, side: Side) -> Option<Vec3> {
-        let cut = &self.cuts[triangle as usize];
-        (!cut.varies).then_some(cut.reflectance[usize::from(side == Side::Back)])
+        self.triangles[triangle as usize].reflectance.map(|sides| sides[usize::from(side == Side::Back)])
     }
 
-    /// Barycentric weights (second, third vertex) of a point of a patch given by weights of its own.
+    /// Converts barycentric weights in a patch to those in its triangle, both of the second and third vertex.
     pub fn point(&self, patch: &Patch, (u, v): (f32, f32)) -> (f32, f32) {
-        if patch.cell & PIECE == 0 {
-            let divisions = self.cuts[patch.triangle as usize].divisions.max(1);
-            return point_in_row(divisions, patch.cell >> ROW, patch.cell & ((1 << ROW) - 1), u, v);
+        if patch.cell & PIECE_FLAG == 0 {
+            let divisions = self.triangles[patch.triangle as usize].divisions.max(1);
+            let (row, place) = (patch.cell >> ROW_SHIFT, patch.cell & ((1 << ROW_SHIFT) - 1));
+            return point_in_row(divisions, row, place, u, v);
         }
-        point_between(&self.lines.pieces[(patch.cell & !PIECE) as usize], u, v)
+        point_between(&self.trees.pieces[(patch.cell & !PIECE_FLAG) as usize], u, v)
     }
 }
 
 impl Patches {
-    /// Of each patch, the distance below which it is too coarse to be read as if it had one light, canonical units: twice its side, which is `side` at
-    /// most.
+    /// Per patch, the distance below which it is too coarse to be treated as uniformly bright, canonical units: twice
+    /// the length of its side, which is at most `side`.
     pub fn near_distances(&self, scene: &BakeScene, side: f32) -> Vec<f32> {
-        let of = |patch: &Patch| {
+        let of_patch = |patch: &Patch| {
             let [a, b, c] = self.corners(scene, patch);
             let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-            // Of half a square, the longest edge is the diagonal.
+            // The longest edge of half a square is the square's diagonal.
             NEAR_SIDES * side.min(longest * FRAC_1_SQRT_2)
         };
-        self.list.iter().map(of).collect()
+        self.list.iter().map(of_patch).collect()
     }
 
     /// The patch's corners, canonical units.
@@ -258,32 +298,60 @@ impl Patches {
     }
 }
 
-/// Sides of a patch within which it is too coarse.
+/// A patch is too coarse within this many times the length of its side.
 const NEAR_SIDES: f32 = 2.0;
 
-/// Pieces along each edge of a triangle.
+/// The cells of a triangle, and how contact lines cut some of them.
+struct TriangleCells {
+    /// Cells along each edge.
+    divisions: u32,
+    /// The numbers of the cells that are cut, ascending, and their pieces.
+    cut: Vec<(u32, CutCell)>,
+}
+
+impl TriangleCells {
+    /// Adds the trees of cut cells to `trees`.
+    fn new(scene: &BakeScene, index: usize, side: f32, trees: &mut BspTrees) -> Self {
+        let divisions = divisions(&scene.triangles[index], side);
+        Self { divisions, cut: cut_cells(scene, index, divisions, side, trees) }
+    }
+
+    /// Number of cells, cut or not.
+    fn count(&self) -> u32 {
+        self.divisions * self.divisions
+    }
+
+    /// Number of patches on one side of the triangle.
+    fn patches_per_side(&self) -> u64 {
+        let added: u64 = self.cut.iter().map(|(_, cut)| u64::from(cut.count - 1)).sum();
+        u64::from(self.divisions).pow(2) + added
+    }
+}
+
+/// Cells along each edge of a triangle.
 fn divisions(triangle: &SceneTriangle, side: f32) -> u32 {
     let [a, b, c] = triangle.corners;
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-    // As many as the area asks for; a sliver is cut until its pieces are four sides long.
+    // As many as its area calls for; a sliver gets more, until its cells are at most four sides long.
     let by_area = (triangle.area / (0.5 * side * side)).sqrt();
     by_area.max(longest / (4.0 * side)).ceil().clamp(1.0, 1024.0) as u32
 }
 
-/// A cell is cut where it is not much smaller than what `side` asks for.
-const WORTH_CUTTING: f32 = 0.125;
+/// Cells are cut only if their area is at least this share of that of a patch of the requested size.
+const MIN_CUT_CELL: f32 = 0.125;
 
-/// BspTrees the cells of a triangle along what stands on it; returns which.
+/// Cuts the cells of a triangle along the contact lines of what stands on it; returns the cells that were cut,
+/// ascending.
 fn cut_cells(
     scene: &BakeScene,
     index: usize,
     divisions: u32,
     side: f32,
-    lines: &mut BspTrees,
+    trees: &mut BspTrees,
 ) -> Vec<(u32, CutCell)> {
     let triangle = &scene.triangles[index];
     let cells = divisions * divisions;
-    if triangle.area < WORTH_CUTTING * 0.5 * side * side * cells as f32 {
+    if triangle.area < MIN_CUT_CELL * 0.5 * side * side * cells as f32 {
         return Vec::new();
     }
     let frame = PlaneFrame::new(triangle);
@@ -293,6 +361,7 @@ fn cut_cells(
     if segments.is_empty() || !weights.is_finite() {
         return Vec::new();
     }
+    // Pairs of a cell and a segment that may cross it.
     let mut crossed: Vec<(u32, u32)> = Vec::new();
     for (number, segment) in segments.iter().enumerate() {
         cells_along(divisions, segment.map(|p| weights * (p - a)), |cell| {
@@ -300,25 +369,26 @@ fn cut_cells(
         });
     }
     crossed.sort_unstable();
-    let mut free = cells;
+    // The slots after those of the cells are for the pieces that cutting adds.
+    let mut free_slot = cells;
     crossed
         .chunk_by(|x, y| x.0 == y.0)
-        .filter_map(|own| {
-            let cell = own[0].0;
+        .filter_map(|crossings| {
+            let cell = crossings[0].0;
             let corners = CORNERS.map(|(u, v)| {
                 let (u, v) = point_of_cell(divisions, cell, u, v);
                 a + (b - a) * f64::from(u) + (c - a) * f64::from(v)
             });
             let segments: Vec<[DVec2; 2]> =
-                own.iter().map(|&(_, number)| segments[number as usize]).collect();
-            let cut = lines.cut(corners, &segments, weights, (cell, free))?;
-            free += cut.count - 1;
+                crossings.iter().map(|&(_, number)| segments[number as usize]).collect();
+            let cut = trees.cut(corners, &segments, weights, (cell, free_slot))?;
+            free_slot += cut.count - 1;
             Some((cell, cut))
         })
         .collect()
 }
 
-/// Calls `visit` for the cells that a segment, in barycentric weights, may cross.
+/// Calls `visit` for every cell that a segment, given in barycentric weights, may cross.
 fn cells_along(divisions: u32, [p, q]: [DVec2; 2], mut visit: impl FnMut(u32)) {
     let n = f64::from(divisions);
     let (p, q) = if p.x <= q.x { (p * n, q * n) } else { (q * n, p * n) };
@@ -340,34 +410,26 @@ fn cells_along(divisions: u32, [p, q]: [DVec2; 2], mut visit: impl FnMut(u32)) {
     }
 }
 
-/// A cell's own corners.
+/// The corners of a patch in barycentric weights of its own.
 const CORNERS: Corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
 
-/// Of a cell or a piece of one.
-fn corners_of(lines: &BspTrees, divisions: u32, cell: u32) -> Corners {
-    if cell & PIECE == 0 {
-        CORNERS.map(|(u, v)| point_of_cell(divisions, cell, u, v))
-    } else {
-        lines.pieces[(cell & !PIECE) as usize]
-    }
-}
-
-/// A piece's share of its triangle.
-fn share(corners: &Corners) -> f32 {
+/// Area of a piece as a share of its triangle's.
+fn area_share(corners: &Corners) -> f32 {
     let [a, b, c] = *corners;
     ((b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1)).abs()
 }
 
+/// The point of a triangle with the given corners at barycentric weights (u, v).
 fn point_between([a, b, c]: &Corners, u: f32, v: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
 }
 
-/// Of a part of a triangle; and how many texels it shows along its longest edge.
-fn mean_reflectance(scene: &BakeScene, index: usize, side: Side, corners: &Corners) -> (Vec3, f32) {
+/// The mean reflectance of a part of a triangle, and the number of texels along its longest edge.
+fn reflectance_and_texels(scene: &BakeScene, index: usize, side: Side, corners: &Corners) -> (Vec3, f32) {
     let triangle = &scene.triangles[index];
     let surface = &scene.surfaces[triangle.surface as usize];
     let texels = surface.reflectance_texels(triangle.vertices, *corners);
-    let points = if surface.varies() { (texels.ceil() as u32).clamp(2, TEXTURE_POINTS) } else { 1 };
+    let points = if surface.varies() { (texels.ceil() as u32).clamp(2, MAX_TEXTURE_POINTS) } else { 1 };
     let mean = mean_of_points(points, |(u, v)| {
         let (u, v) = point_between(corners, u, v);
         surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
@@ -375,7 +437,7 @@ fn mean_reflectance(scene: &BakeScene, index: usize, side: Side, corners: &Corne
     (mean, texels)
 }
 
-/// Row `a` holds 2(n - a) - 1 cells, so the rows before it hold a(2n - a).
+/// The number of the cell at a point. Row `a` holds 2(n - a) - 1 cells, so the rows before it hold a(2n - a).
 fn cell_at(divisions: u32, u: f32, v: f32) -> u32 {
     let n = divisions as f32;
     let (x, y) = (u.clamp(0.0, 1.0) * n, v.clamp(0.0, 1.0) * n);
@@ -385,16 +447,17 @@ fn cell_at(divisions: u32, u: f32, v: f32) -> u32 {
     a * (2 * divisions - a) + 2 * b + u32::from(beyond)
 }
 
-/// A cell, or a piece of one, as a patch keeps it: to find the row takes a root.
+/// The number of a cell or piece as [`Patch::cell`] stores it. A cell is stored as its row and its place in it, since
+/// finding the row takes a square root.
 fn packed(divisions: u32, cell: u32) -> u32 {
-    if cell & PIECE != 0 {
+    if cell & PIECE_FLAG != 0 {
         return cell;
     }
-    let (row, within) = row_of_cell(divisions, cell);
-    row << ROW | within
+    let (row, place) = row_of_cell(divisions, cell);
+    row << ROW_SHIFT | place
 }
 
-/// A cell's row and place in it.
+/// The row of a cell, and the cell's place in it.
 fn row_of_cell(divisions: u32, cell: u32) -> (u32, u32) {
     let n = f64::from(divisions);
     // The largest a with a(2n - a) <= cell.
@@ -408,17 +471,19 @@ fn row_of_cell(divisions: u32, cell: u32) -> (u32, u32) {
     (a, cell - a * (2 * divisions - a))
 }
 
+/// Converts barycentric weights in a cell to those in its triangle.
 fn point_of_cell(divisions: u32, cell: u32, u: f32, v: f32) -> (f32, f32) {
-    let (row, within) = row_of_cell(divisions, cell);
-    point_in_row(divisions, row, within, u, v)
+    let (row, place) = row_of_cell(divisions, cell);
+    point_in_row(divisions, row, place, u, v)
 }
 
-fn point_in_row(divisions: u32, a: u32, within: u32, u: f32, v: f32) -> (f32, f32) {
-    let b = within / 2;
-    let (x, y) = if within.is_multiple_of(2) {
+/// As [`point_of_cell`], for the cell at a place of row `a`.
+fn point_in_row(divisions: u32, a: u32, place: u32, u: f32, v: f32) -> (f32, f32) {
+    let b = place / 2;
+    let (x, y) = if place.is_multiple_of(2) {
         (a as f32 + u, b as f32 + v)
     } else {
-        // The turned cell between (a+1, b), (a+1, b+1) and (a, b+1).
+        // The upside-down cell between (a+1, b), (a+1, b+1) and (a, b+1).
         (a as f32 + 1.0 - u, b as f32 + 1.0 - v)
     };
     (x / divisions as f32, y / divisions as f32)
@@ -429,7 +494,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_cell_finds_itself() {
+    fn a_point_in_a_cell_is_found_in_that_cell() {
         for divisions in [1, 2, 3, 7, 64] {
             for cell in 0..divisions * divisions {
                 for at in [(1.0 / 3.0, 1.0 / 3.0), (0.1, 0.1), (0.8, 0.1), (0.1, 0.8)] {

@@ -1,20 +1,22 @@
-//! What the rays of a patch have met, as counts per patch. Not the rays, nor the form factors that follow from them.
+//! What the rays of each patch have hit, as counts per patch hit. Rays are cast in `cosine_rays` and `global_lines`;
+//! counts become form factors in `form_factors`.
 
 use serde::{Deserialize, Serialize};
 
 use super::patch_index::PatchIndex;
 
-/// Rays of one patch, in two halves: how many met each other patch, began inside other geometry, met nothing.
+/// The rays of one patch in two independent halves: how many hit each other patch, began inside other geometry, or hit
+/// nothing.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct PatchRayCounts {
     pub hits: [Vec<(PatchIndex, u32)>; 2],
     pub inside: [u32; 2],
     pub missed: [u32; 2],
-    /// How many they were.
+    /// How many rays there were.
     pub count: [u32; 2],
 }
 
-/// The same, of one half or of both together.
+/// As [`PatchRayCounts`], for one half or for both together.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Counts {
     pub hits: Vec<(PatchIndex, u32)>,
@@ -24,7 +26,7 @@ pub(crate) struct Counts {
 }
 
 impl Counts {
-    /// Share of the rays that did not begin inside other geometry; of none all.
+    /// Share of the rays that did not begin inside other geometry; 1 if there are no rays.
     pub fn open(&self) -> f32 {
         if self.count == 0 { 1.0 } else { (self.count - self.inside) as f32 / self.count as f32 }
     }
@@ -42,7 +44,7 @@ impl PatchRayCounts {
         }
     }
 
-    /// One of them.
+    /// One half.
     pub fn half(&self, half: usize) -> Counts {
         Counts {
             hits: self.hits[half].clone(),
@@ -63,21 +65,22 @@ impl PatchRayCounts {
     }
 }
 
+/// The sum of two lists of counts by patch, all ascending.
 pub(crate) fn merged(a: &[(PatchIndex, u32)], b: &[(PatchIndex, u32)]) -> Vec<(PatchIndex, u32)> {
     let mut both = Vec::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     loop {
-        let next = [a.peek().map(|own| own.0), b.peek().map(|own| own.0)];
+        let next = [a.peek().map(|entry| entry.0), b.peek().map(|entry| entry.0)];
         let Some(patch) = next.into_iter().flatten().min() else { return both };
-        let is_next = |&&(own, _): &&(PatchIndex, u32)| own == patch;
+        let is_next = |&&(other, _): &&(PatchIndex, u32)| other == patch;
         both.push((
             patch,
-            a.next_if(is_next).map_or(0, |own| own.1) + b.next_if(is_next).map_or(0, |own| own.1),
+            a.next_if(is_next).map_or(0, |entry| entry.1) + b.next_if(is_next).map_or(0, |entry| entry.1),
         ));
     }
 }
 
-/// How often each patch occurs, in order.
+/// How often each patch occurs, ascending by patch.
 pub(crate) fn counted(mut hits: Vec<PatchIndex>) -> Vec<(PatchIndex, u32)> {
     hits.sort_unstable();
     let mut row: Vec<(PatchIndex, u32)> = Vec::new();

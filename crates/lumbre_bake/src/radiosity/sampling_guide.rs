@@ -1,6 +1,7 @@
-//! Where the light that arrives comes from, as the solution knows it: the final gather sends a share of its samples there
-//! (Ureña and Torres, "Improved Irradiance Computation by Importance Sampling", 1997). By regions of several patches: few rays
-//! tell each patch's part of the light badly, and many a patch that gives light is met by none. Not the gather.
+//! Importance sampling by the radiosity solution: it knows where the light that arrives at a surface comes from, and
+//! the final gather sends a share of its samples there (Ureña and Torres, "Improved Irradiance Computation by
+//! Importance Sampling", 1997). Regions of several patches are sampled, since with few rays a single patch's form
+//! factors are noisy, and often 0 for a patch that does give light. The samples are taken in `final_gather`.
 
 use glam::Vec3;
 
@@ -11,28 +12,31 @@ use super::patches::{Patch, Patches};
 use crate::scene::BakeScene;
 use crate::scene::material::Side;
 
-/// A region of the guide, by its place among all of them.
+/// A region of the guide, by its place among all regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Region(u32);
 
-/// For each region, those that light it by bounces, with a probability in proportion to the irradiance they bring.
+/// For each region, the regions that light it by bounces, with probabilities in proportion to the irradiance that they
+/// contribute.
 #[derive(Clone, Debug)]
 pub(crate) struct SamplingGuide {
-    /// Cut as patches are, but larger.
+    /// Made as patches are, but larger.
     regions: Patches,
     rows: Rows,
 }
 
-/// Share of the samples that the guide places, at most; where the sky shines, which it does not know, fewer, in steps of one in
-/// so many: so that the others are as many as their weight says.
-const GUIDED: f32 = 0.4;
-const STEPS: f32 = 8.0;
+/// Largest share of the samples that the guide places. It is smaller where the sky contributes, which the guide does
+/// not sample, and rounded to a multiple of 1 / `SHARE_STEPS`, so that the numbers of guided and of other samples match
+/// the weights of both strategies.
+const MAX_SHARE: f32 = 0.4;
+const SHARE_STEPS: f32 = 8.0;
 
 /// Patches along a region's side.
-const REGION: f32 = 4.0;
+const REGION_SIDE: f32 = 4.0;
 
 impl SamplingGuide {
-    /// From the patches (of `side` canonical units), their exchange, what leaves each of them and what the sky brings it (W/m²).
+    /// From the patches (of `side` canonical units), their form factors, the radiosity of each and its irradiance by
+    /// the sky (W/m²).
     pub fn new(
         scene: &BakeScene,
         patches: &Patches,
@@ -41,10 +45,10 @@ impl SamplingGuide {
         radiosity: &[f32],
         sky: &[Vec3],
     ) -> Self {
-        let Some(larger) = LargerPatches::new(scene, patches, REGION * side) else {
-            return Self { regions: Patches::outlines(scene, REGION * side), rows: Rows::new(0) };
+        let Some(larger) = LargerPatches::new(scene, patches, REGION_SIDE * side) else {
+            return Self { regions: Patches::outlines(scene, REGION_SIDE * side), rows: Rows::new(0) };
         };
-        let bright = |region: usize| -> f64 {
+        let mean_radiosity = |region: usize| -> f64 {
             let area = larger.patches.list[region].area;
             let of_member = |member: &PatchIndex| {
                 let share = patches.list[member.place()].area / area;
@@ -52,108 +56,120 @@ impl SamplingGuide {
             };
             larger.members[region].iter().map(of_member).sum()
         };
-        let bright: Vec<f64> = (0..larger.members.len()).map(bright).collect();
-        let of_row = |members: &[PatchIndex], exchange: Vec<(PatchIndex, f64)>| {
-            let flux: Vec<(u32, f64)> =
-                exchange.into_iter().map(|(region, g)| (region.0, g * bright[region.place()])).collect();
+        let radiosity_of_regions: Vec<f64> = (0..larger.members.len()).map(mean_radiosity).collect();
+        let share_and_row = |members: &[PatchIndex], exchange: Vec<(PatchIndex, f64)>| {
+            let flux: Vec<(u32, f64)> = exchange
+                .into_iter()
+                .map(|(region, g)| (region.0, g * radiosity_of_regions[region.place()]))
+                .collect();
             let by_bounces: f64 = flux.iter().map(|(_, flux)| flux).sum();
-            let of_sky = |member: &PatchIndex| {
+            let sky_flux = |member: &PatchIndex| {
                 f64::from(factors.areas[member.place()] * sky[member.place()].element_sum())
             };
-            let by_sky: f64 = members.iter().map(of_sky).sum();
+            let by_sky: f64 = members.iter().map(sky_flux).sum();
             let share = by_bounces / (by_bounces + by_sky);
-            let share = if share.is_finite() { (GUIDED * STEPS * share as f32).round() / STEPS } else { 0.0 };
+            let share = if share.is_finite() {
+                (MAX_SHARE * SHARE_STEPS * share as f32).round() / SHARE_STEPS
+            } else {
+                0.0
+            };
             (share, if share > 0.0 { cumulative(flux) } else { Vec::new() })
         };
-        let found = larger.rows(factors, of_row);
-        let mut rows = Rows::new(found.len());
-        rows.entries.reserve_exact(found.iter().map(|(_, row)| row.len()).sum());
-        found.into_iter().for_each(|(share, row)| rows.push(share, &row));
+        let distributions = larger.rows(factors, share_and_row);
+        let mut rows = Rows::new(distributions.len());
+        rows.entries.reserve_exact(distributions.iter().map(|(_, row)| row.len()).sum());
+        distributions.into_iter().for_each(|(share, row)| rows.push(share, &row));
         let regions = larger.patches;
         Self { regions, rows }
     }
 
-    /// The region at a point of a triangle's side; none where light does not arrive.
+    /// The region at a point of a triangle's side; `None` where no light is received.
     pub fn region_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> Option<Region> {
         self.regions.at(triangle, side, at).map(|region| Region(region.0))
     }
 
-    /// Its surface.
+    /// The surface of a region.
     pub fn region(&self, region: Region) -> &Patch {
         &self.regions.list[region.0 as usize]
     }
 
-    /// Barycentric weights (second, third vertex) of a point of a region given by weights of its own.
+    /// Converts barycentric weights in a region to those in its triangle, both of the second and third vertex.
     pub fn point(&self, region: Region, at: (f32, f32)) -> (f32, f32) {
         self.regions.point(self.region(region), at)
     }
 
-    /// The share of the samples at a region that it places, in [0, 1); none if the solution knows of no light by bounces that arrives there.
+    /// The share of the samples at a region that the guide places, in [0, 1); `None` if according to the solution no
+    /// light arrives there by bounces.
     pub fn share(&self, region: Region) -> Option<f32> {
         self.rows.share(region.0)
     }
 
-    /// Where in the list of those that light `region` to look for the one at `u` in [0, 1).
+    /// Where to search for `u` in [0, 1) in the distribution of the regions that light `region`.
     pub fn near(&self, region: Region, u: f32) -> RowPart {
         self.rows.near(region.0, u)
     }
 
-    /// Of those that light a region, the one at `u`, of which `part` is [near](Self::near); the place within its interval, stretched to
-    /// [0, 1); its probability.
+    /// Samples a region at `u` from a distribution, given the `part` that [`near`](Self::near) returned. Returns the
+    /// region, the place of `u` in its interval, stretched to [0, 1), and its probability.
     pub fn pick(&self, part: &RowPart, u: f32) -> Option<(Region, f32, f32)> {
         let (region, u, probability) = self.rows.pick(part, u)?;
         Some((Region(region), u, probability))
     }
 
-    /// Where in the list of those that light `region` to look for `other`.
+    /// Where to search for `other` in the distribution of the regions that light `region`.
     pub fn near_region(&self, region: Region, other: Region) -> RowPart {
         self.rows.near_column(region.0, other.0)
     }
 
-    /// The probability that [`pick`](Self::pick) takes `other`, of which `part` is [near](Self::near_region).
+    /// The probability that [`pick`](Self::pick) returns `other`, given the `part` that
+    /// [`near_region`](Self::near_region) returned.
     pub fn probability(&self, part: &RowPart, other: Region) -> f32 {
         self.rows.probability(part, other.0)
     }
 }
 
-/// Discrete distributions over the same numbers, sparse. What is read together lies together: most of it is in no near cache.
+/// Sparse discrete distributions over the same columns, one per row. They are too large for the near caches, so what is
+/// read together is stored together.
 #[derive(Clone, Debug, Default)]
 struct Rows {
-    /// Columns of one part are the same but for so many of their lowest bits.
+    /// The columns are divided into parts: columns of the same part differ in this many of their lowest bits only.
     part_bits: u32,
     heads: Vec<Head>,
-    /// Of all rows; columns ascend in each.
+    /// Of all rows, one after the other; columns ascend in each row.
     entries: Vec<Entry>,
-    /// Of each row where its columns of each part of the numbers begin, and its sums of each part of [0, 1]: so few have to be looked
-    /// through (Chen and Asau, "On Generating Random Variates from an Empirical Distribution", 1974).
+    /// Per row, the entry at which each part of the columns begins, and that at which each part of the cumulative
+    /// probability in [0, 1] begins: a search then looks at few entries (Chen and Asau, "On Generating Random Variates
+    /// from an Empirical Distribution", 1974).
     column_index: Vec<u32>,
     cumulative_index: Vec<u32>,
 }
 
-/// A row.
+/// Where a row is.
 #[derive(Clone, Copy, Debug)]
 struct Head {
     /// Its first entry.
     start: usize,
-    /// How many it has.
+    /// Number of its entries.
     count: u32,
-    /// Share of the samples that it places.
+    /// Share of the samples that are placed by this row.
     share: f32,
 }
 
-/// Of a row: a column, and the running sum of the probabilities up to it; the last is 1.
+/// A column of a row, and the sum of the row's probabilities up to and including it; the last sum is 1.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     column: u32,
     end: f32,
 }
 
-/// A part of a row, and what stands in its middle: read before it is needed, together with those of other samples.
+/// A part of a row to be searched. Its middle entry is read in advance, so that the cache misses of several samples
+/// overlap.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowPart {
-    /// Where the row begins in the list of all entries, and how many it has; the rest counts from there.
+    /// Where the row begins in the list of all entries, and the number of its entries.
     begin: usize,
     count: u32,
+    /// The part is the range `first..last` of the row's entries; `entry` is the one at `middle`.
     first: u32,
     last: u32,
     middle: u32,
@@ -161,15 +177,15 @@ pub(crate) struct RowPart {
 }
 
 impl RowPart {
-    /// Of no row.
+    /// An empty part, of no row.
     pub const NONE: Self =
         Self { begin: 0, count: 0, first: 0, last: 0, middle: 0, entry: Entry { column: 0, end: 1.0 } };
 }
 
-/// Parts of a row's index.
+/// Number of parts in each index of a row.
 const PARTS: usize = 64;
 
-/// The distribution in proportion to weights at ascending columns; empty if none is positive and finite.
+/// The distribution in proportion to weights at ascending columns; empty if no weight is positive and finite.
 fn cumulative(mut weights: Vec<(u32, f64)>) -> Vec<Entry> {
     weights.retain(|(_, weight)| weight.is_finite() && *weight > 0.0);
     let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
@@ -182,21 +198,22 @@ fn cumulative(mut weights: Vec<(u32, f64)>) -> Vec<Entry> {
 }
 
 impl Rows {
-    /// Of columns below `numbers`.
-    fn new(numbers: usize) -> Self {
-        let part_bits = numbers.div_ceil(PARTS).max(1).next_power_of_two().trailing_zeros();
+    /// Without rows yet, for columns below `columns`.
+    fn new(columns: usize) -> Self {
+        let part_bits = columns.div_ceil(PARTS).max(1).next_power_of_two().trailing_zeros();
         Self { part_bits, ..Self::default() }
     }
 
-    /// A row: ascending columns.
+    /// Appends a row, whose columns ascend.
     fn push(&mut self, share: f32, row: &[Entry]) {
         self.heads.push(Head { start: self.entries.len(), count: row.len() as u32, share });
         self.entries.extend_from_slice(row);
         for part in 0..=PARTS {
-            let first = (part as u64) << self.part_bits;
-            self.column_index.push(row.partition_point(|entry| u64::from(entry.column) < first) as u32);
-            let least = part as f32 / PARTS as f32;
-            self.cumulative_index.push(row.partition_point(|entry| entry.end <= least) as u32);
+            let first_column = (part as u64) << self.part_bits;
+            self.column_index
+                .push(row.partition_point(|entry| u64::from(entry.column) < first_column) as u32);
+            let start = part as f32 / PARTS as f32;
+            self.cumulative_index.push(row.partition_point(|entry| entry.end <= start) as u32);
         }
     }
 
@@ -223,15 +240,16 @@ impl Rows {
         self.part(&self.column_index, row, (column >> self.part_bits) as usize)
     }
 
-    /// The first entry of a part that is not `before`, or the end of the part; and the end of the one before it.
-    fn find(&self, part: &RowPart, before: impl Fn(&Entry) -> bool) -> (Option<&Entry>, f32) {
-        let range = if part.first < part.last && before(&part.entry) {
+    /// The first entry of a part for which `is_before` is false, or the one after the part, `None` at the end of the
+    /// row; and the `end` of the entry before it.
+    fn find(&self, part: &RowPart, is_before: impl Fn(&Entry) -> bool) -> (Option<&Entry>, f32) {
+        let range = if part.first < part.last && is_before(&part.entry) {
             part.middle + 1..part.last
         } else {
             part.first..part.middle
         };
-        let within = &self.entries[part.begin + range.start as usize..part.begin + range.end as usize];
-        let at = range.start as usize + within.partition_point(before);
+        let searched = &self.entries[part.begin + range.start as usize..part.begin + range.end as usize];
+        let at = range.start as usize + searched.partition_point(is_before);
         let start = if at == 0 { 0.0 } else { self.entries[part.begin + at - 1].end };
         (self.entries.get(part.begin + at).filter(|_| at < part.count as usize), start)
     }
@@ -287,26 +305,26 @@ mod tests {
     }
 
     #[test]
-    fn what_gets_no_light_is_not_guided() {
+    fn a_row_without_positive_weights_has_no_share() {
         let rows = rows();
         assert_eq!([0, 1, 2].map(|row| rows.share(row)), [Some(0.4), None, Some(0.25)]);
         assert_eq!(pick(&rows, 1, 0.5), None);
     }
 
     #[test]
-    fn the_indices_find_what_a_search_through_the_whole_row_finds() {
+    fn a_search_by_the_indices_gives_the_same_as_one_through_the_whole_row() {
         let mut rows = Rows::new(1000);
         let weight = |column: u32| if column % 7 < 3 { 0.0 } else { f64::from(column % 13).powi(4) };
         rows.push(0.4, &cumulative((0..1000).map(|column| (column, weight(column))).collect()));
-        let few = (0..1000).filter(|column| column % 250 == 3).map(|column| (column, 1.0));
-        rows.push(0.4, &cumulative(few.collect()));
+        let sparse = (0..1000).filter(|column| column % 250 == 3).map(|column| (column, 1.0));
+        rows.push(0.4, &cumulative(sparse.collect()));
         for row in 0..2 {
             let head = rows.heads[row as usize];
             let entries = &rows.entries[head.start..head.start + head.count as usize];
             for step in 0..5000 {
                 let u = step as f32 / 5000.0;
                 let at = entries.partition_point(|entry| entry.end <= u);
-                assert_eq!(pick(&rows, row, u).map(|found| found.0), Some(entries[at].column), "{u}");
+                assert_eq!(pick(&rows, row, u).map(|picked| picked.0), Some(entries[at].column), "{u}");
             }
             for column in 0..1000 {
                 let expected = entries

@@ -1,8 +1,9 @@
-//! What the patches' size leaves in their light: the same system with patches twice as large, each the sum of those that it is made of, no
-//! ray more. The mean light of constant elements converges with a power of their size: the second where light is smooth (as in Galerkin's method;
-//! Troutman and Max, "Radiosity Algorithms Using Higher Order Finite Element Methods", 1993), a lower one in rooms, whose shadows have edges that
-//! no patch follows. By Richardson's extrapolation that tells, from what differs between the two, what the finer one is still off by. Not the noise
-//! of form factors: that is told by two halves of the rays.
+//! The error in the patches' light that is due to their size. The same system is solved with patches twice as large,
+//! whose form factors are sums of those at hand, without any more rays. The mean light of constant elements converges
+//! with a power of their size: the second where light is smooth (as in Galerkin's method; Troutman and Max, "Radiosity
+//! Algorithms Using Higher Order Finite Element Methods", 1993), a lower one in rooms, where no patch follows the edges
+//! of shadows. From the difference of the two solutions, Richardson's extrapolation estimates the error of the finer
+//! one. The error by the noise of form factors is estimated in `exchange`, from two halves of the rays.
 
 use super::form_factors::FormFactors;
 use super::larger_patches::LargerPatches;
@@ -12,13 +13,13 @@ use super::solution::gather;
 use crate::options::Solver;
 use crate::scene::BakeScene;
 
-/// Times larger.
+/// How many times larger the coarse patches are.
 const COARSER: f32 = 2.0;
-/// The power of the patches' size with which the error falls, as it was measured in rooms.
+/// The power of the patches' size with which the error falls, measured in rooms.
 const ORDER: f64 = 1.2;
 
-/// The error, with its sign, of each patch's irradiance by bounces, for grey reflectances, and light that direct light and the sky have
-/// brought (`first`, W/m²); `side` is the patches' own.
+/// The signed error of each patch's irradiance by bounces, for one channel's (or the mean) reflectances and irradiance
+/// by direct light and sky (`first`, W/m²); `side` is that of `patches`.
 pub(crate) fn size_error(
     scene: &BakeScene,
     patches: &Patches,
@@ -32,36 +33,37 @@ pub(crate) fn size_error(
     };
     let emission: Vec<f64> = reflectance.iter().zip(first).map(|(rho, light)| rho * light).collect();
     let fine = gather(factors, &solver.solve(factors, reflectance, &emission, tolerance).radiosity);
-    // Means by area.
+    // Integrals over the larger patches, and means weighted by area.
     let areas: Vec<f64> = factors.areas.iter().map(|&area| f64::from(area)).collect();
-    let summed = |of: &dyn Fn(usize) -> f64| {
+    let integral = |value: &dyn Fn(usize) -> f64| {
         let mut sums = vec![0.0; larger.patches.list.len()];
         for (patch, &large) in larger.of.iter().enumerate() {
-            sums[large.place()] += areas[patch] * of(patch);
+            sums[large.place()] += areas[patch] * value(patch);
         }
         sums
     };
-    let total = summed(&|_| 1.0);
-    let mean = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+    let larger_areas = integral(&|_| 1.0);
+    let mean = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
         let over_area = |(sum, area): (f64, &f64)| if *area > 0.0 { sum / area } else { 0.0 };
-        summed(of).into_iter().zip(&total).map(over_area).collect()
+        integral(value).into_iter().zip(&larger_areas).map(over_area).collect()
     };
-    let coarse = exchange(factors, &larger, &total);
-    let solution = solver.solve(&coarse, &mean(&|i| reflectance[i]), &mean(&|i| emission[i]), tolerance);
-    let found = gather(&coarse, &solution.radiosity);
-    let expected = mean(&|i| fine[i]);
-    // Of what differs, the part that the finer one is off by.
-    let part = 1.0 / (f64::from(COARSER).powf(ORDER) - 1.0);
-    let left = |large: &PatchIndex| (part * (found[large.place()] - expected[large.place()])) as f32;
-    larger.of.iter().map(left).collect()
+    let coarse_factors = larger_factors(factors, &larger, &larger_areas);
+    let solution =
+        solver.solve(&coarse_factors, &mean(&|i| reflectance[i]), &mean(&|i| emission[i]), tolerance);
+    let coarse = gather(&coarse_factors, &solution.radiosity);
+    let fine = mean(&|i| fine[i]);
+    // The error of the finer solution as a share of the difference between the two.
+    let share = 1.0 / (f64::from(COARSER).powf(ORDER) - 1.0);
+    let error = |large: &PatchIndex| (share * (coarse[large.place()] - fine[large.place()])) as f32;
+    larger.of.iter().map(error).collect()
 }
 
-/// Between the larger patches, of these areas.
-fn exchange(factors: &FormFactors, larger: &LargerPatches, areas: &[f64]) -> FormFactors {
+/// The form factors between the larger patches, which have these areas.
+fn larger_factors(factors: &FormFactors, larger: &LargerPatches, areas: &[f64]) -> FormFactors {
     let mut coarse = FormFactors { starts: vec![0], stop: factors.stop.clone(), ..FormFactors::default() };
-    let single =
+    let to_f32 =
         |row: Vec<(PatchIndex, f64)>| row.into_iter().map(|(larger, g)| (larger, g as f32)).collect();
-    let rows: Vec<Vec<(PatchIndex, f32)>> = larger.rows(factors, |_, row| single(row));
+    let rows: Vec<Vec<(PatchIndex, f32)>> = larger.rows(factors, |_, row| to_f32(row));
     for row in rows {
         coarse.columns.extend(row.iter().map(|entry| entry.0));
         coarse.exchange.extend(row.iter().map(|entry| entry.1));

@@ -1,4 +1,4 @@
-//! A solution of the radiosity system, and the sums over patches that every way to find it takes. Not the ways: those are `solver` and
+//! A solution of the radiosity system, and the sums over patches that all solvers need. The solvers are in `solver` and
 //! `stationary`.
 
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 
-/// A solution and how it was come by.
+/// A solution, and how it was reached.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Solution {
     /// B_i, in the units of E_i.
@@ -16,10 +16,10 @@ pub(crate) struct Solution {
     pub residual: f64,
 }
 
-/// More iterations than any ρ <= 0.999 needs for a residual of 1e-12.
+/// Limit of the iterations: more than any ρ <= 0.999 needs for a residual of 1e-12.
 pub(crate) const MAX_ITERATIONS: u32 = 30_000;
 
-/// Σ_j F_ij x_j of every patch.
+/// Σ_j F_ij x_j for every patch i.
 pub(crate) fn gather(factors: &FormFactors, x: &[f64]) -> Vec<f64> {
     (0..factors.len())
         .into_par_iter()
@@ -27,12 +27,12 @@ pub(crate) fn gather(factors: &FormFactors, x: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Σ_j G_ij x_j of the patch at place i.
+/// Σ_j G_ij x_j for the patch at place i.
 pub(crate) fn exchanged(factors: &FormFactors, i: usize, x: &[f64]) -> f64 {
     factors.row(PatchIndex::new(i)).map(|(j, g)| g * x[j.place()]).sum()
 }
 
-/// By area.
+/// The Euclidean norm, weighted by area.
 pub(crate) fn norm(factors: &FormFactors, x: &[f64]) -> f64 {
     x.iter().zip(&factors.areas).map(|(x, &area)| x * x * f64::from(area)).sum::<f64>().sqrt()
 }

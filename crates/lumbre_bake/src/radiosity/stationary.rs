@@ -1,11 +1,12 @@
-//! The radiosity system by sweeps over all patches, each reading what those before have found: Jacobi's method, which is one bounce more per
-//! sweep, as the documents have it, and Gauss and Seidel's (Cohen and Wallace, "Radiosity and Realistic Image Synthesis", 1993, chapter 5).
-//! They check the default, which is in `solver` and takes fewer steps.
+//! Stationary iterative solvers of the radiosity system, by sweeps over all patches: Jacobi's method, in which each
+//! sweep adds one bounce, and Gauss and Seidel's (Cohen and Wallace, "Radiosity and Realistic Image Synthesis", 1993,
+//! chapter 5). They serve to check the default solver, conjugate gradients in `solver`, which takes fewer steps.
 
 use super::form_factors::FormFactors;
 use super::solution::{MAX_ITERATIONS, Solution, exchanged, gather, norm};
 
-/// B ← E + ρ F B, of all patches at once; until the residual is at most `tolerance` of the emission's `size`.
+/// B ← E + ρ F B for all patches at once, until the residual is at most `tolerance` times `size`, the norm of the
+/// emission.
 pub(crate) fn jacobi(
     factors: &FormFactors,
     reflectance: &[f64],
@@ -13,7 +14,7 @@ pub(crate) fn jacobi(
     tolerance: f64,
     size: f64,
 ) -> Solution {
-    iterated(factors, emission, tolerance, size, |x| {
+    iterate(factors, emission, tolerance, size, |x| {
         let gathered = gather(factors, x);
         for (i, value) in x.iter_mut().enumerate() {
             *value = emission[i] + reflectance[i] * gathered[i];
@@ -21,7 +22,7 @@ pub(crate) fn jacobi(
     })
 }
 
-/// The same, each patch reading what the sweep has found before it.
+/// As [`jacobi`], but each patch reads the values that the same sweep has already updated.
 pub(crate) fn gauss_seidel(
     factors: &FormFactors,
     reflectance: &[f64],
@@ -29,7 +30,7 @@ pub(crate) fn gauss_seidel(
     tolerance: f64,
     size: f64,
 ) -> Solution {
-    iterated(factors, emission, tolerance, size, |x| {
+    iterate(factors, emission, tolerance, size, |x| {
         for i in 0..x.len() {
             let gathered = exchanged(factors, i, x) / f64::from(factors.areas[i]);
             x[i] = emission[i] + reflectance[i] * gathered;
@@ -37,7 +38,8 @@ pub(crate) fn gauss_seidel(
     })
 }
 
-fn iterated(
+/// Repeats a sweep until the residual is small enough.
+fn iterate(
     factors: &FormFactors,
     emission: &[f64],
     tolerance: f64,
@@ -49,7 +51,8 @@ fn iterated(
         let before = solution.radiosity.clone();
         sweep(&mut solution.radiosity);
         solution.iterations += 1;
-        // What Jacobi changes is the residual of what was before; Gauss-Seidel's change is a bound of its kind.
+        // The change by a Jacobi sweep is the residual before the sweep; the change by Gauss-Seidel serves as a similar
+        // measure.
         let change: Vec<f64> = solution.radiosity.iter().zip(&before).map(|(new, old)| new - old).collect();
         solution.residual = norm(factors, &change) / size;
         if solution.residual <= tolerance {

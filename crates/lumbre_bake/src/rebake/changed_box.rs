@@ -1,23 +1,25 @@
-//! The box of an object that changed, then or now. Not what it does to the light.
+//! The bounding box of an object that has changed, before or after the change. The effect on the light is estimated in
+//! `direct_light_invalidation` and `indirect_change`.
 
 use glam::Vec3;
 
-/// A box that a changed object filled, or fills now; canonical units.
+/// The bounding box of a changed object as it was or as it is, canonical units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ChangedBox {
     pub low: Vec3,
     pub high: Vec3,
-    /// For what is gone: the least and the most that left it, W/m². None for what is here now.
-    pub left: Option<[Vec3; 2]>,
+    /// For an object of the former scene: the least and the most light that left it, W/m². `None` for an object of the
+    /// new scene.
+    pub former_exitance: Option<[Vec3; 2]>,
 }
 
 impl ChangedBox {
-    /// Of the sphere around it.
+    /// Centre of the bounding sphere.
     pub fn center(&self) -> Vec3 {
         0.5 * (self.low + self.high)
     }
 
-    /// Of the sphere around it.
+    /// Radius of the bounding sphere.
     pub fn radius(&self) -> f32 {
         0.5 * (self.high - self.low).length()
     }

@@ -1,5 +1,6 @@
-//! What differs between a scene and the one that samples are of: objects that moved, came or went, with the boxes around them then and now,
-//! and the lights. Not what that does to the light.
+//! The differences between a scene and the one that samples were taken of: objects that moved, came or went, with their
+//! bounding boxes before and after, and the lights. Their effect on the light is estimated in
+//! `direct_light_invalidation` and `indirect_change`.
 
 use super::fingerprints::bounds;
 use crate::rebake::changed_box::ChangedBox;
@@ -19,13 +20,14 @@ use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
 use crate::{BakeOptions, BakeReport, RebakeReport};
 
-/// More changed objects than this are as good as a new scene.
+/// With more changed objects than this the whole scene is baked.
 const MAX_CHANGED: usize = 64;
-/// The density and the middle of a scene may be off by so much of the density and of the scene's size before everything is laid out anew.
+/// The whole scene is baked if its density differs by more than this share, or if its centre has moved by more than
+/// this share of its size.
 const DENSITY_SLACK: f64 = 0.05;
 const CENTER_SLACK: f64 = 0.25;
 
-/// A former bake whose samples can be used, before the scene is laid out.
+/// A former bake whose samples can be used, and the layout parameters to take over from it.
 pub(crate) struct ReusableBake<'a> {
     pub former: &'a Content,
     pub space: Canonical,
@@ -33,7 +35,7 @@ pub(crate) struct ReusableBake<'a> {
 }
 
 impl<'a> ReusableBake<'a> {
-    /// What of a former bake can be used; the report says why where nothing can.
+    /// Checks whether the samples of a former bake can be used; if not, the report says why.
     pub fn of(
         samples: Option<&'a Samples>,
         hashes: &Hashes,
@@ -43,17 +45,17 @@ impl<'a> ReusableBake<'a> {
     ) -> Option<Self> {
         match Self::new(samples?, hashes, &input.objects, input.space(), options) {
             Ok(reusable) => Some(reusable),
-            Err(whole) => {
-                report.rebake = Some(RebakeReport { whole, ..RebakeReport::default() });
+            Err(reason) => {
+                report.rebake = Some(RebakeReport { whole: reason, ..RebakeReport::default() });
                 None
             }
         }
     }
 
-    /// In `space`, where a whole bake would work.
+    /// `space` is the one that a bake without samples would use.
     ///
     /// # Errors
-    /// Why they cannot be used.
+    /// Why the samples cannot be used.
     fn new(
         samples: &'a Samples,
         hashes: &Hashes,
@@ -71,10 +73,10 @@ impl<'a> ReusableBake<'a> {
         if space.scale != former.space.scale || moved > CENTER_SLACK {
             return Err("the scene is larger or smaller than it was, or somewhere else".into());
         }
-        let here = missing(&hashes.objects, former.objects.iter().map(|object| &object.hash));
-        let gone = missing(former.objects.iter().map(|object| &object.hash), &hashes.objects);
-        if here.max(gone) > MAX_CHANGED {
-            return Err(format!("{} objects have changed or moved", here.max(gone)));
+        let new = count_missing(&hashes.objects, former.objects.iter().map(|object| &object.hash));
+        let gone = count_missing(former.objects.iter().map(|object| &object.hash), &hashes.objects);
+        if new.max(gone) > MAX_CHANGED {
+            return Err(format!("{} objects have changed or moved", new.max(gone)));
         }
         let density = density_of(objects, former.space, options);
         if (density / former.density - 1.0).abs() > DENSITY_SLACK {
@@ -83,7 +85,8 @@ impl<'a> ReusableBake<'a> {
         Ok(Self { former, space: former.space, density: former.density })
     }
 
-    /// Of a bake of `content` that keeps these. Where nothing has changed, everything is kept, and so are its bits.
+    /// The identity of a bake of `content` that keeps these samples. It is the former one if nothing has changed: then
+    /// everything is kept, with the same bits.
     pub fn identity(&self, content: ContentHash) -> ContentHash {
         if self.former.content == content {
             self.former.identity
@@ -93,14 +96,14 @@ impl<'a> ReusableBake<'a> {
     }
 }
 
-/// How many of the one are not among the other.
-fn missing<'h>(
+/// How many of `these` are not among the others, counted with multiplicity.
+fn count_missing<'h>(
     these: impl IntoIterator<Item = &'h ContentHash>,
     others: impl IntoIterator<Item = &'h ContentHash>,
 ) -> usize {
-    let mut left: HashMap<ContentHash, usize> = HashMap::new();
-    others.into_iter().for_each(|other| *left.entry(*other).or_default() += 1);
-    let is_missing = |hash: &&ContentHash| match left.get_mut(*hash) {
+    let mut unmatched: HashMap<ContentHash, usize> = HashMap::new();
+    others.into_iter().for_each(|other| *unmatched.entry(*other).or_default() += 1);
+    let is_missing = |hash: &&ContentHash| match unmatched.get_mut(*hash) {
         Some(count) if *count > 0 => {
             *count -= 1;
             false
@@ -110,28 +113,29 @@ fn missing<'h>(
     these.into_iter().filter(is_missing).count()
 }
 
-/// What differs, and what is known of the rest.
+/// What differs from the former bake, and what the former bake knows of everything else.
 pub(crate) struct Changes<'a> {
     pub former: &'a Content,
-    /// Nothing differs: all is kept as it is.
-    pub none: bool,
-    /// Per object, whether it is new, or another than it was.
+    /// Whether nothing differs, so that everything is kept as it is.
+    pub nothing_changed: bool,
+    /// Per object, whether it is new or has changed.
     pub changed: Vec<bool>,
+    /// Of changed objects, before and after.
     pub boxes: Vec<ChangedBox>,
-    /// Direct light is different everywhere.
-    pub lights: bool,
-    /// For people.
+    /// Whether lights, the sky or emissive surfaces have changed, so that direct light may differ everywhere.
+    pub lights_changed: bool,
+    /// What has changed, for the report.
     pub names: Vec<String>,
-    /// Per covered texel, its samples, if it shows what it showed.
+    /// Per covered texel, its former samples, if it still shows the same surface.
     pub known: Vec<Option<&'a TexelSamples>>,
-    /// Per covered texel, the direct light that cannot have changed.
+    /// Per covered texel, its former direct light, if that cannot have changed.
     pub known_direct: Vec<Option<Direct>>,
-    /// Per texel of all maps, the irradiance that the former bake found there, W/m²; NaN where it is not known.
+    /// Per texel of all maps, the irradiance of the former bake, W/m²; NaN where that is not known.
     pub former_light: Vec<Vec3>,
 }
 
 impl<'a> Changes<'a> {
-    /// Finds them.
+    /// Compares a scene with that of a former bake.
     pub fn find(
         reusable: &ReusableBake<'a>,
         hashes: &Hashes,
@@ -142,12 +146,12 @@ impl<'a> Changes<'a> {
         let (scene, former) = (sources.scene, reusable.former);
         let CoveredTexels { layout, list: texels, charts, .. } = texels;
         let mut by_hash: HashMap<ContentHash, Vec<&'a ObjectSamples>> = HashMap::new();
-        // Of several that are the same, the first is taken first.
+        // Lists are in reverse order, so that of several equal objects the first is popped first.
         for object in former.objects.iter().rev() {
             by_hash.entry(object.hash).or_default().push(object);
         }
-        // Objects that share their mesh share their unwrap, which may be another although they have not changed.
-        let same: Vec<Option<&'a ObjectSamples>> = hashes
+        // Objects that share their mesh share their unwrap, which may be different although the object has not changed.
+        let unchanged: Vec<Option<&'a ObjectSamples>> = hashes
             .objects
             .iter()
             .zip(layouts(scene, layout))
@@ -156,46 +160,67 @@ impl<'a> Changes<'a> {
         let gone: Vec<&ObjectSamples> = former
             .objects
             .iter()
-            .filter(|object| !same.iter().flatten().any(|kept| std::ptr::eq(*kept, *object)))
+            .filter(|object| !unchanged.iter().flatten().any(|other| std::ptr::eq(*other, *object)))
             .collect();
-        let changed: Vec<bool> = same.iter().map(Option::is_none).collect();
-        let shines = emission(scene, sources, layout);
-        let of_lamps =
-            shines.iter().zip(&same).any(|(own, same)| *own != same.map_or(0, |same| same.emission))
-                || gone.iter().any(|gone| gone.emission != 0);
-        let of_lights = former.lights != hashes.lights;
+        let changed: Vec<bool> = unchanged.iter().map(Option::is_none).collect();
+        let emission = emission(scene, sources, layout);
+        let differs = |(emission, former): (&u32, &Option<&ObjectSamples>)| {
+            *emission != former.map_or(0, |former| former.emission)
+        };
+        let emitters_changed =
+            emission.iter().zip(&unchanged).any(differs) || gone.iter().any(|gone| gone.emission != 0);
+        let lights_or_sky_changed = former.lights != hashes.lights;
         let bounds = bounds(scene, layout);
-        let now = (0..objects.len()).filter(|&object| changed[object]);
-        let now = now.map(|object| ChangedBox { low: bounds[object].0, high: bounds[object].1, left: None });
-        let then = gone.iter().map(|o| ChangedBox { low: o.low, high: o.high, left: Some(o.exitance) });
-        let boxes: Vec<ChangedBox> = now.chain(then).filter(|b| b.low.cmple(b.high).all()).collect();
-        let names = names(objects, &changed, &gone, of_lights);
-        let (known, former_light) = known(scene, layout, texels, &same);
-        let none = former.content == hashes.content;
-        let lights = of_lamps || of_lights;
-        let of = |(known, shadowed): (&Option<&TexelSamples>, bool)| {
-            known.filter(|_| !shadowed).map(|known| known.direct)
+        let after = (0..objects.len()).filter(|&object| changed[object]).map(|object| {
+            let (low, high) = bounds[object];
+            ChangedBox { low, high, former_exitance: None }
+        });
+        let before = gone.iter().map(|object| ChangedBox {
+            low: object.low,
+            high: object.high,
+            former_exitance: Some(object.exitance),
+        });
+        let boxes: Vec<ChangedBox> = after.chain(before).filter(|b| b.low.cmple(b.high).all()).collect();
+        let names = names(objects, &changed, &gone, lights_or_sky_changed);
+        let (known, former_light) = known(scene, layout, texels, &unchanged);
+        let nothing_changed = former.content == hashes.content;
+        let lights_changed = emitters_changed || lights_or_sky_changed;
+        let unless_shadowed = |(known, is_shadowed): (&Option<&TexelSamples>, bool)| {
+            known.filter(|_| !is_shadowed).map(|known| known.direct)
         };
-        let known_direct = match lights {
+        let known_direct = match lights_changed {
             true => vec![None; texels.len()],
-            false => known.iter().zip(shadowed(sources, texels, charts, &boxes)).map(of).collect(),
+            false => {
+                let shadowed = shadowed(sources, texels, charts, &boxes);
+                known.iter().zip(shadowed).map(unless_shadowed).collect()
+            }
         };
-        Self { former, none, changed, boxes, lights, names, known, known_direct, former_light }
+        Self {
+            former,
+            nothing_changed,
+            changed,
+            boxes,
+            lights_changed,
+            names,
+            known,
+            known_direct,
+            former_light,
+        }
     }
 
-    /// Covered texels whose direct light is found anew.
+    /// Number of covered texels whose direct light is computed anew.
     pub fn relit(&self, texels: &[Texel]) -> usize {
         let pairs = texels.iter().zip(&self.known_direct);
         pairs.filter(|(texel, known)| known.is_none() && !texel.is_hidden()).count()
     }
 }
 
-/// What is different, by name.
+/// The names of what has changed.
 fn names(objects: &[SceneObject], changed: &[bool], gone: &[&ObjectSamples], lights: bool) -> Vec<String> {
     let mut names = Vec::new();
     for (object, _) in objects.iter().zip(changed).filter(|(_, changed)| **changed) {
-        let before = gone.iter().any(|gone| gone.name == object.name);
-        names.push(format!("{} ({})", object.name, if before { "changed" } else { "new" }));
+        let was_there = gone.iter().any(|gone| gone.name == object.name);
+        names.push(format!("{} ({})", object.name, if was_there { "changed" } else { "new" }));
     }
     for gone in gone.iter().filter(|gone| {
         !objects.iter().zip(changed).any(|(object, changed)| *changed && object.name == gone.name)
@@ -208,16 +233,17 @@ fn names(objects: &[SceneObject], changed: &[bool], gone: &[&ObjectSamples], lig
     names
 }
 
-/// The samples of every covered texel that shows what it showed; and the light of all, per texel of all maps.
+/// The former samples of every covered texel that still shows the same surface, and the former irradiance per texel of
+/// all maps. `unchanged` holds the former samples of each object that has not changed.
 fn known<'a>(
     scene: &BakeScene,
     layout: &LightmapLayout,
     texels: &[Texel],
-    same: &[Option<&'a ObjectSamples>],
+    unchanged: &[Option<&'a ObjectSamples>],
 ) -> (Vec<Option<&'a TexelSamples>>, Vec<Vec3>) {
     let first = first_triangles(scene, layout);
     let mut light = vec![Vec3::NAN; layout.texels];
-    for (map, object) in layout.maps.iter().zip(same) {
+    for (map, object) in layout.maps.iter().zip(unchanged) {
         for texel in object.iter().flat_map(|object| &object.texels) {
             if texel.cell < map.width * map.height {
                 light[map.first + texel.cell as usize] = texel.direct.total() + texel.bounced;
@@ -228,10 +254,10 @@ fn known<'a>(
         .iter()
         .map(|texel| {
             let object = texel.object as usize;
-            let list = &same[object].filter(|_| !texel.is_hidden())?.texels;
+            let list = &unchanged[object].filter(|_| !texel.is_hidden())?.texels;
             let cell = texel.y * layout.maps[object].width + texel.x;
-            let own = &list[list.binary_search_by_key(&cell, |own| own.cell).ok()?];
-            (own.footprint == fingerprint(texel, first[object])).then_some(own)
+            let samples = &list[list.binary_search_by_key(&cell, |samples| samples.cell).ok()?];
+            (samples.footprint == fingerprint(texel, first[object])).then_some(samples)
         })
         .collect();
     (known, light)

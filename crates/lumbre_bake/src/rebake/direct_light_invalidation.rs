@@ -1,5 +1,6 @@
-//! Which texels' direct light a change can have affected: those from which the way to some source leads through a box that a changed object
-//! filled or fills. Never too few: texels and sources count as the spheres around them. Not the light itself.
+//! Finds the texels whose direct light a change can have affected: those from which a path to some source leads through
+//! the box of a changed object, before or after the change. The test is conservative, with bounding spheres for blocks
+//! of texels, sources and boxes. The light itself is computed in `direct_light`.
 
 use std::collections::HashMap;
 
@@ -15,7 +16,7 @@ use crate::scene::{Canonical, PlacedLight};
 use crate::sources::emitters::lamps;
 use crate::sources::light_sources::Sources;
 
-/// A ball, canonical units.
+/// Canonical units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Sphere {
     center: Vec3,
@@ -23,6 +24,7 @@ struct Sphere {
 }
 
 impl Sphere {
+    /// A sphere that contains all points.
     fn around(points: impl Iterator<Item = Vec3> + Clone) -> Self {
         let (low, high) = points.clone().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| {
             (low.min(point), high.max(point))
@@ -35,23 +37,26 @@ impl Sphere {
 /// Where light comes from.
 enum Source {
     Near(Sphere),
-    /// From so far away that it comes from one direction, or a cone about it (half its angle, radians).
+    /// A directional light.
     Far {
+        /// Direction to the light.
         towards: Vec3,
+        /// Half the light's angular diameter, radians.
         angle: f32,
     },
 }
 
-/// Texels along the side of a block that is asked as a whole.
+/// Texels along the side of a block that is tested as a whole.
 const BLOCK: u32 = 8;
-/// Longer than any way through a scene whose coordinates are below 2.25.
+/// Longer than any path through a scene whose coordinates are below 2.25.
 const FAR: f32 = 16.0;
-/// Where a texel of a smooth surface is asked how far it is above its facets.
-const LIFTED: [(f32, f32); 5] = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
-/// What rounding may make of the spheres, relative to the scene.
+/// Places in a texel of a smooth surface at which its height above the facets is taken into account.
+const SMOOTH_POINTS: [(f32, f32); 5] = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+/// Added to radii to cover rounding, relative to the scene's size.
 const SLACK: f32 = 1e-4;
 
-/// The ways on which a box may stand, or have stood, in the light.
+/// The regions of space where changed boxes may block light from a source, or may have blocked it: the convex hulls of
+/// a source and a box.
 pub(crate) struct ShadowVolumes {
     sources: Vec<Source>,
     boxes: Vec<Sphere>,
@@ -60,20 +65,22 @@ pub(crate) struct ShadowVolumes {
 impl ShadowVolumes {
     pub fn new(sources: &Sources<'_>, boxes: &[ChangedBox]) -> Self {
         let boxes = boxes.iter().map(|b| Sphere { center: b.center(), radius: b.radius() + SLACK });
-        Self { sources: spheres(sources), boxes: boxes.collect() }
+        Self { sources: bounded_sources(sources), boxes: boxes.collect() }
     }
 
-    /// Whether that may be so for some of these places, or any between them.
-    pub fn cross(&self, places: &[Vec3]) -> bool {
-        if places.is_empty() {
+    /// Whether a box may be, or may have been, between a source and some of these points or any point between them.
+    pub fn cross(&self, points: &[Vec3]) -> bool {
+        if points.is_empty() {
             return false;
         }
-        let own = Sphere::around(places.iter().copied());
-        self.sources.iter().any(|source| self.boxes.iter().any(|between| source.meets(own, *between)))
+        let receiver = Sphere::around(points.iter().copied());
+        self.sources
+            .iter()
+            .any(|source| self.boxes.iter().any(|blocker| source.may_be_blocked(receiver, *blocker)))
     }
 }
 
-/// Per covered texel, whether a box may stand, or have stood, in its light.
+/// Per covered texel, whether a box may block light that reaches it, or may have blocked it.
 pub(crate) fn shadowed(
     sources: &Sources<'_>,
     texels: &[Texel],
@@ -83,38 +90,40 @@ pub(crate) fn shadowed(
     let scene = sources.scene;
     let volumes = ShadowVolumes::new(sources, boxes);
     let blocks = TexelGroups::blocks(texels, charts, BLOCK);
-    let reached: Vec<bool> = blocks
+    let is_shadowed: Vec<bool> = blocks
         .members
         .par_iter()
         .map(|members| {
-            let mut shown = Vec::new();
+            let mut points = Vec::new();
             for texel in members.iter().map(|&member| &texels[member as usize]) {
-                positions_of(scene, texel, &mut shown);
+                positions_of(scene, texel, &mut points);
                 if !scene.triangles[texel.triangle as usize].flat {
-                    // The smooth surface lies above its facets, most of all in their middle.
-                    let lifted = LIFTED.into_iter().filter_map(|(x, y)| texel.point(scene, x, y));
-                    shown.extend(lifted.map(|point| receiver(scene, &point).position));
+                    // Light is computed at points of the smooth surface, which lies above the facets, most of all in
+                    // their middle.
+                    let smooth = SMOOTH_POINTS.into_iter().filter_map(|(x, y)| texel.point(scene, x, y));
+                    points.extend(smooth.map(|point| receiver(scene, &point).position));
                 }
             }
-            volumes.cross(&shown)
+            volumes.cross(&points)
         })
         .collect();
-    blocks.group_of.iter().map(|&block| reached[block as usize]).collect()
+    blocks.group_of.iter().map(|&block| is_shadowed[block as usize]).collect()
 }
 
-fn spheres(sources: &Sources<'_>) -> Vec<Source> {
-    let mut of_lamps: HashMap<u32, Vec<Vec3>> = HashMap::new();
+/// The lights, and the emitters by lamps (connected emissive surfaces).
+fn bounded_sources(sources: &Sources<'_>) -> Vec<Source> {
+    let mut corners_of_lamps: HashMap<u32, Vec<Vec3>> = HashMap::new();
     for (emitter, lamp) in sources.emitters.iter().zip(lamps(sources.scene, &sources.emitters)) {
-        of_lamps.entry(lamp).or_default().extend(emitter.corners);
+        corners_of_lamps.entry(lamp).or_default().extend(emitter.corners);
     }
-    let lamps = of_lamps.values().map(|points| Source::Near(Sphere::around(points.iter().copied())));
+    let lamps = corners_of_lamps.values().map(|points| Source::Near(Sphere::around(points.iter().copied())));
     let lights = sources.lights.iter().map(|light| Source::of_light(light, sources.scene.space));
     lamps.chain(lights).collect()
 }
 
 impl Source {
     fn of_light(placed: &PlacedLight, space: Canonical) -> Self {
-        // What is no size counts as none, as in the bake.
+        // As in the direct light, sizes that are negative or NaN count as 0.
         let size = |size: f32| if size > 0.0 { size } else { 0.0 };
         let radius = (f64::from(size(placed.light.radius)) * space.scale) as f32;
         match placed.light.kind {
@@ -125,22 +134,23 @@ impl Source {
         }
     }
 
-    /// Whether some way from `own` to this leads through `between`.
-    fn meets(&self, own: Sphere, between: Sphere) -> bool {
+    /// Whether some path from `receiver` to this source leads through `blocker`.
+    fn may_be_blocked(&self, receiver: Sphere, blocker: Sphere) -> bool {
         let end = match *self {
             Self::Near(sphere) => sphere,
             Self::Far { towards, angle } => Sphere {
-                center: own.center + towards * FAR,
-                // Beyond what it may be, nothing is excluded.
-                radius: own.radius + FAR * angle.min(1.5).tan(),
+                center: receiver.center + towards * FAR,
+                // The limit keeps the tangent finite; the sphere then is so large that it excludes next to nothing.
+                radius: receiver.radius + FAR * angle.min(1.5).tan(),
             },
         };
-        hull_distance(own, end, between.center) <= between.radius
+        hull_distance(receiver, end, blocker.center) <= blocker.radius
     }
 }
 
-/// Distance of a point to the convex hull of two spheres; at most 0 inside. The least of the distances to the spheres whose centres and
-/// radii run evenly from the one to the other, found in closed form: it is a convex function.
+/// Distance of a point to the convex hull of two spheres; at most 0 inside. It is the least distance to any of the
+/// spheres whose centres and radii are interpolated linearly between the two; that distance is a convex function of the
+/// place, and its minimum has a closed form.
 fn hull_distance(a: Sphere, b: Sphere, point: Vec3) -> f32 {
     let axis = b.center - a.center;
     let length = axis.length();
@@ -151,13 +161,13 @@ fn hull_distance(a: Sphere, b: Sphere, point: Vec3) -> f32 {
     };
     let (from, to) = (at(0.0), at(length));
     let slope = (b.radius - a.radius) / length;
-    // The one contains the other, or they are in one place.
+    // One sphere contains the other, or both have the same centre.
     if length == 0.0 || slope.abs() >= 1.0 {
         return from.min(to);
     }
     let along = to_point.dot(axis) / length;
-    let apart = (to_point.length_squared() - along * along).max(0.0).sqrt();
-    let nearest = along + apart * slope / (1.0 - slope * slope).sqrt();
+    let across = (to_point.length_squared() - along * along).max(0.0).sqrt();
+    let nearest = along + across * slope / (1.0 - slope * slope).sqrt();
     from.min(to).min(at(nearest.max(0.0).min(length)))
 }
 
@@ -167,14 +177,15 @@ mod tests {
     use crate::sampling::{Sequence, Stream};
 
     #[test]
-    fn the_hull_is_that_of_all_spheres_between() {
-        // Against a search along the axis: the least of 4096 spheres is a bound from above, by at most the step.
+    fn hull_distance_is_the_least_of_all_spheres_between() {
+        // Compared with a search along the axis: the least distance to 4096 spheres is an upper bound, too large by one
+        // step at most.
         for case in 0..200u32 {
             let sequence = Sequence::new(3, Stream::Test(1), case);
-            let mut at = 0;
+            let mut index = 0;
             let mut vector = || {
-                at += 1;
-                let [x, y, z, _] = sequence.point(at, 0);
+                index += 1;
+                let [x, y, z, _] = sequence.point(index, 0);
                 Vec3::new(x, y, z) * 4.0 - 2.0
             };
             let (p, q, point) = (vector(), vector(), vector());
@@ -185,13 +196,16 @@ mod tests {
                 .map(|i| i as f32 / steps as f32)
                 .map(|t| p.lerp(q, t).distance(point) - (a.radius + (b.radius - a.radius) * t))
                 .fold(f32::INFINITY, f32::min);
-            let found = hull_distance(a, b, point);
-            assert!(found <= searched + 1e-5 && found >= searched - 2e-3, "{case}: {found} {searched}");
+            let distance = hull_distance(a, b, point);
+            assert!(
+                distance <= searched + 1e-5 && distance >= searched - 2e-3,
+                "{case}: {distance} {searched}"
+            );
         }
     }
 
     #[test]
-    fn a_sphere_in_another_has_the_hull_of_the_larger() {
+    fn the_hull_of_a_sphere_within_another_is_the_larger_one() {
         let large = Sphere { center: Vec3::ZERO, radius: 2.0 };
         let small = Sphere { center: Vec3::X * 0.5, radius: 0.5 };
         let point = Vec3::new(0.0, 3.0, 0.0);

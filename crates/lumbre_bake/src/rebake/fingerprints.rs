@@ -1,5 +1,5 @@
-//! What is compared between two bakes of an object: its box, what of it shines, where its texels are and what they show, each in one number. Not the
-//! comparison.
+//! What two bakes of an object are compared by: its bounding box, and hashes of its emission, of its lightmap layout
+//! and of what its texels show. The comparison is made in `changes`.
 
 use glam::Vec3;
 
@@ -8,7 +8,7 @@ use crate::sampling::hash;
 use crate::scene::{BakeScene, LightmapLayout};
 use crate::sources::light_sources::Sources;
 
-/// The box around each object, canonical units; empty for one without triangles.
+/// The bounding box of each object, canonical units; empty for an object without triangles.
 pub(crate) fn bounds(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(Vec3, Vec3)> {
     let mut bounds = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); layout.maps.len()];
     for triangle in &scene.triangles {
@@ -20,20 +20,20 @@ pub(crate) fn bounds(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(Vec3, V
     bounds
 }
 
-/// Per object, what of it shines, in one number; 0 for nothing.
+/// Per object, a hash of its emitters; 0 if it has none.
 pub(crate) fn emission(scene: &BakeScene, sources: &Sources<'_>, layout: &LightmapLayout) -> Vec<u32> {
     let first = first_triangles(scene, layout);
     let mut emission = vec![0; layout.maps.len()];
     for emitter in &sources.emitters {
         let object = scene.triangles[emitter.triangle as usize].object as usize;
-        let own = emitter.radiance.to_array().map(f32::to_bits);
-        let words = own.into_iter().chain([emitter.triangle - first[object], emitter.side as u32]);
+        let radiance = emitter.radiance.to_array().map(f32::to_bits);
+        let words = radiance.into_iter().chain([emitter.triangle - first[object], emitter.side as u32]);
         emission[object] = words.fold(emission[object], fold).max(1);
     }
     emission
 }
 
-/// Per object, where its texels are on it, in one number.
+/// Per object, a hash of its lightmap's size and texture coordinates, by which its texels are placed on it.
 pub(crate) fn layouts(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
     let mut sums: Vec<u32> = layout.maps.iter().map(|map| fold(fold(0, map.width), map.height)).collect();
     for triangle in &scene.triangles {
@@ -45,13 +45,13 @@ pub(crate) fn layouts(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
     sums
 }
 
-/// A hash of a hash and a word more.
+/// Combines a hash with one more word.
 pub(super) fn fold(sum: u32, word: u32) -> u32 {
     hash(sum ^ word).wrapping_mul(0x9e37_79b9)
 }
 
-/// What a texel shows, in one number: the same as long as its object and what hides it are the same. `first` is the first triangle of its
-/// object.
+/// A hash of what a texel shows: it stays the same as long as its object and what hides parts of it stay the same.
+/// `first` is the first triangle of the object.
 pub(crate) fn fingerprint(texel: &Texel, first: u32) -> u32 {
     match &texel.footprint {
         Footprint::Hidden => 0,

@@ -1,8 +1,10 @@
-//! How the light by bounces changes: a linear estimate. What leaves a surface is what it was, but for three things: rays that pass through a
-//! box see or do not see the changed object in it; direct light has changed where it was computed anew; and what bounces has changed by the same
-//! estimate, one bounce later. By channel, between bounds: a box that was filled may or may not have been in a ray's way, and may have shown its
-//! brightest or its darkest side. Bounds add up by themselves, so that what is more here and less there cancels only where that is certain.
-//! Not exact: what is sampled has the error of its samples, of which one standard error counts.
+//! A linear estimate of how the light by bounces changes. The light that arrives at a point differs from the former
+//! bake's for three reasons: a ray through a changed box hits, or no longer hits, the object in it; the direct light of
+//! the surface at its end has been computed anew; and the bounced light of that surface has changed by the same
+//! estimate, one bounce later. The change is bounded from below and from above, by channel: an object that is gone may
+//! or may not have been hit by a ray through its box, and may have shown its brightest or its darkest side. Lower and
+//! upper bounds add up separately, so that increases and decreases cancel only where they are certain. Bounds are means
+//! of samples, so they are not exact: one standard error is added. What to keep is decided in `choice`.
 
 use std::f32::consts::{PI, TAU};
 
@@ -13,7 +15,7 @@ use super::changed_box::ChangedBox;
 use super::changes::Changes;
 use super::choice;
 use super::direct_light_invalidation::ShadowVolumes;
-use super::estimate::{Estimate, Range, cap, in_cap};
+use super::estimate::{Estimate, Range, cone_to_sphere, direction_in_cone};
 use crate::chunks::in_chunks;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Texel, receiver};
@@ -34,12 +36,12 @@ use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
 use crate::{BakeError, BakeOptions, BakeReport};
 
-/// Rays of a patch and of a block of texels; every other one towards what has changed.
+/// Rays from a patch or from a block of texels. Every other one is aimed at what has changed.
 const RAYS: u32 = 32;
 /// Texels along the side of a block.
 const BLOCK: u32 = 4;
-/// What is nearer to a box than this share of its size has changed for certain.
-const BESIDE: f32 = 1.0 / 16.0;
+/// Nothing is kept of texels that are nearer to a changed box than this share of its size.
+const NEAR_BOX: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
@@ -70,35 +72,35 @@ pub(crate) fn reused_gather(
     Ok(reused)
 }
 
-/// The light before and now, as far as it is needed to tell the difference.
+/// The light before and after, as far as the estimate needs it.
 struct IndirectChange<'a> {
     scene: &'a BakeScene,
     layout: &'a LightmapLayout,
     changes: &'a Changes<'a>,
     blocks: TexelGroups,
-    /// Per texel of all maps, by how much direct light (mixed lights included) has changed, W/m².
+    /// Per texel of all maps, the change of direct light (mixed lights included), W/m².
     direct: Vec<Vec3>,
-    /// Irradiance of an unhidden sky now, W/m².
+    /// Irradiance by an unoccluded sky in the new scene, W/m².
     sky: Vec3,
-    /// The changed boxes as spheres: centre, radius.
-    cones: Vec<(Vec3, f32)>,
+    /// Bounding spheres of the changed boxes: centre and radius.
+    spheres: Vec<(Vec3, f32)>,
     shadow_volumes: ShadowVolumes,
 }
 
-/// What leaves the patches now, and the change of what they receive by bounces, if it is known yet.
+/// The light that leaves the patches in the new scene, and the change of their irradiance by bounces.
 #[derive(Clone, Copy)]
 struct PatchLight<'a> {
     patches: &'a Patches,
-    /// W/m², without emission.
+    /// Without emission, W/m².
     exitance: &'a [Vec3],
-    /// W/m²; empty if not known.
+    /// W/m²; empty if not known yet.
     change: &'a [Range],
-    /// Backs, which no texel shows, whose direct light may be another than it was.
+    /// Backs, which no texel shows, whose direct light may have changed.
     unknown: &'a [bool],
 }
 
 impl<'a> IndirectChange<'a> {
-    /// From the direct light of every covered texel as it is now.
+    /// `direct` is the direct light of every covered texel in the new scene.
     fn new(
         sources: &Sources<'a>,
         changes: &'a Changes<'a>,
@@ -119,19 +121,19 @@ impl<'a> IndirectChange<'a> {
             blocks: TexelGroups::blocks(texels, charts, BLOCK),
             direct: change,
             sky: sources.sky,
-            cones: changes.boxes.iter().map(|b| (b.center(), b.radius())).collect(),
+            spheres: changes.boxes.iter().map(|b| (b.center(), b.radius())).collect(),
             shadow_volumes: ShadowVolumes::new(sources, &changes.boxes),
         }
     }
 
-    /// About how many rays the estimate takes.
+    /// About how many rays the estimate took.
     fn rays(&self, of_patches: &[Range]) -> u64 {
-        let asked = if of_patches.is_empty() { 0 } else { of_patches.len() + self.blocks.members.len() };
-        u64::from(RAYS) * asked as u64
+        let origins = if of_patches.is_empty() { 0 } else { of_patches.len() + self.blocks.members.len() };
+        u64::from(RAYS) * origins as u64
     }
 
-    /// The change of what each patch receives by bounces, W/m²: Δ = S + F ρ Δ, with the change S that is seen at first hand. Nothing in it is
-    /// negative, so that bounds of the one are bounds of the other.
+    /// The change of each patch's irradiance by bounces, W/m²: Δ = S + F ρ Δ, where S is the immediate change. F and ρ
+    /// are not negative, so that bounds of S give bounds of Δ.
     fn of_patches(
         &self,
         exchange: &Exchange,
@@ -139,7 +141,7 @@ impl<'a> IndirectChange<'a> {
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<Range>, BakeError> {
-        if self.changes.none {
+        if self.changes.nothing_changed {
             return Ok(Vec::new());
         }
         let Exchange { patches, exitance, .. } = exchange;
@@ -149,7 +151,7 @@ impl<'a> IndirectChange<'a> {
         let is_new = |patch: &Patch| {
             self.changes.changed[self.scene.triangles[patch.triangle as usize].object as usize]
         };
-        let first: Vec<(Vec3, Vec3)> = in_chunks(patches.list.len(), monitor, |index| {
+        let immediate: Vec<(Vec3, Vec3)> = in_chunks(patches.list.len(), monitor, |index| {
             let patch = &patches.list[index];
             if is_new(patch) || patch.reflectance == Vec3::ZERO {
                 return (Vec3::ZERO, Vec3::ZERO);
@@ -159,17 +161,22 @@ impl<'a> IndirectChange<'a> {
                 let at = patches.point(patch, triangle_point(x, y));
                 Some(Receiver::on_facet(self.scene, patch.triangle, patch.side, at))
             };
-            self.seen(sequence, &|_, x, y| point(x, y), light).means().into()
+            self.sampled_change(sequence, &|_, x, y| point(x, y), light).means().into()
         })?;
-        let bound = |which: usize, patch: usize| if which == 0 { first[patch].0 } else { first[patch].1 };
-        let job = |job: usize| {
+        let bound = |which: usize, patch: usize| {
+            if which == 0 { immediate[patch].0 } else { immediate[patch].1 }
+        };
+        // One job per bound and channel.
+        let solve = |job: usize| {
             let (which, channel) = (job / 3, job % 3);
-            // What changed objects themselves receive is not a change of theirs.
-            let of_patch = |patch: &Patch| f64::from(patch.reflectance[channel]);
-            let reflectance: Vec<f64> =
-                patches.list.iter().map(|patch| if is_new(patch) { 0.0 } else { of_patch(patch) }).collect();
-            // The solver knows light only: what is more and what is less, apart.
-            let [more, less] = [1.0f64, -1.0].map(|sign| {
+            // The light of changed objects is part of the immediate change: rays that hit them read their new exitance.
+            let reflectance_of = |patch: &Patch| match is_new(patch) {
+                true => 0.0,
+                false => f64::from(patch.reflectance[channel]),
+            };
+            let reflectance: Vec<f64> = patches.list.iter().map(reflectance_of).collect();
+            // The solver allows no negative emission: increases and decreases are solved separately.
+            let [increase, decrease] = [1.0f64, -1.0].map(|sign| {
                 let emission: Vec<f64> = reflectance
                     .iter()
                     .enumerate()
@@ -177,28 +184,30 @@ impl<'a> IndirectChange<'a> {
                     .collect();
                 gather(factors, &solver.solve(factors, &reflectance, &emission, TOLERANCE).radiosity)
             });
-            more.iter().zip(&less).map(|(more, less)| more - less).collect::<Vec<f64>>()
+            increase.iter().zip(&decrease).map(|(more, less)| more - less).collect::<Vec<f64>>()
         };
         let solved: Vec<Vec<f64>> =
-            monitor.run_interruptible(1.0, || (0..6usize).into_par_iter().map(job).collect())?;
-        let of_patch = |which: usize, patch: usize| {
+            monitor.run_interruptible(1.0, || (0..6usize).into_par_iter().map(solve).collect())?;
+        let change = |which: usize, patch: usize| {
             let [red, green, blue] = [0, 1, 2].map(|channel| solved[3 * which + channel][patch]);
             bound(which, patch) + DVec3::new(red, green, blue).as_vec3()
         };
-        Ok((0..patches.list.len()).map(|patch| [of_patch(0, patch), of_patch(1, patch)]).collect())
+        Ok((0..patches.list.len()).map(|patch| [change(0, patch), change(1, patch)]).collect())
     }
 
-    /// Per patch, whether it is a back whose direct light may have changed: no texel tells by how much.
+    /// Per patch, whether it is a back whose direct light may have changed: as no texel shows it, the change is not
+    /// known.
     fn unknown_backs(&self, patches: &Patches) -> Vec<bool> {
         let is_unknown = |patch: &Patch| {
             patch.side == Side::Back
                 && patch.reflectance != Vec3::ZERO
-                && (self.changes.lights || self.shadow_volumes.cross(&patches.corners(self.scene, patch)))
+                && (self.changes.lights_changed
+                    || self.shadow_volumes.cross(&patches.corners(self.scene, patch)))
         };
         patches.list.par_iter().map(is_unknown).collect()
     }
 
-    /// What is kept of the light by bounces.
+    /// Chooses what is kept of the light by bounces.
     fn keep(
         &self,
         exchange: &Exchange,
@@ -208,8 +217,8 @@ impl<'a> IndirectChange<'a> {
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<ReusedGather, BakeError> {
-        if self.changes.none {
-            return Ok(choice::all(self.changes));
+        if self.changes.nothing_changed {
+            return Ok(choice::keep_all(self.changes));
         }
         let Exchange { patches, exitance, .. } = exchange;
         let unknown = self.unknown_backs(patches);
@@ -218,8 +227,8 @@ impl<'a> IndirectChange<'a> {
         Ok(choice::choose(self.changes, texels, &change, local, options.error))
     }
 
-    /// By how much the light by bounces may have changed at every covered texel, W/m², root mean square of the channels: that of its block.
-    /// Infinite within what has changed.
+    /// By how much the light by bounces may have changed at every covered texel, W/m², root mean square of the
+    /// channels. It is estimated for blocks of texels, and infinite in and next to changed boxes.
     fn of_texels(
         &self,
         texels: &[Texel],
@@ -227,65 +236,66 @@ impl<'a> IndirectChange<'a> {
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<f32>, BakeError> {
-        let found = in_chunks(self.blocks.members.len(), monitor, |block| {
+        let of_blocks = in_chunks(self.blocks.members.len(), monitor, |block| {
             let members: Vec<&Texel> =
                 self.blocks.members[block].iter().map(|&member| &texels[member as usize]).collect();
             if members.is_empty() {
                 return 0.0f32;
             }
             let sequence = Sequence::new(options.seed, Stream::ChangedTexels, block as u32);
-            // Each is asked in both ways in turn.
+            // Two successive rays, one of each kind, share a texel.
             let point = |ray: u32, x, y| {
                 let texel = members[ray as usize / 2 % members.len()];
                 texel.point(self.scene, x, y).map(|point| receiver(self.scene, &point))
             };
-            let within = members.iter().any(|texel| {
+            let is_changed = members.iter().any(|texel| {
                 let point = texel.point(self.scene, 0.5, 0.5);
-                point.is_some_and(|point| self.is_within(receiver(self.scene, &point).position))
+                point.is_some_and(|point| self.is_near_box(receiver(self.scene, &point).position))
             });
-            if within { f32::INFINITY } else { self.seen(sequence, &point, light).most() }
+            if is_changed { f32::INFINITY } else { self.sampled_change(sequence, &point, light).largest() }
         })?;
-        Ok(self.blocks.group_of.iter().map(|&block| found[block as usize]).collect())
+        Ok(self.blocks.group_of.iter().map(|&block| of_blocks[block as usize]).collect())
     }
 
     /// Whether a point is in a changed box, or next to it.
-    fn is_within(&self, position: Vec3) -> bool {
+    fn is_near_box(&self, position: Vec3) -> bool {
         self.changes
             .boxes
             .iter()
-            .any(|b| position.clamp(b.low, b.high).distance(position) <= BESIDE * b.radius())
+            .any(|b| position.clamp(b.low, b.high).distance(position) <= NEAR_BOX * b.radius())
     }
 
-    /// The change of what a receiver gets by bounces, with the light as it is known: half the rays by the cosine, half into the cones about what
-    /// has changed, in proportion to their solid angles, weighed by the balance heuristic (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte
-    /// Carlo Rendering", 1995, section 3.3).
-    fn seen(
+    /// Samples the change of a receiver's irradiance by bounces: half the rays are cosine-distributed, half are aimed
+    /// into the cones around what has changed, in proportion to their solid angles. They are combined by the balance
+    /// heuristic (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", 1995, section
+    /// 3.3).
+    fn sampled_change(
         &self,
         sequence: Sequence,
         point: &impl Fn(u32, f32, f32) -> Option<Receiver>,
         light: PatchLight<'_>,
     ) -> Estimate {
         let mut estimate = Estimate::default();
-        // Solid angles of the cones over 2π, running.
-        let mut ends = Vec::with_capacity(self.cones.len());
+        // Running sums of the cones' solid angles over 2π.
+        let mut ends = Vec::with_capacity(self.spheres.len());
         for ray in 0..RAYS {
             let [x, y, u, v] = sequence.point(ray, 0);
             let Some(receiver) = point(ray, x, y) else { continue };
-            let caps: Vec<(Vec3, f32)> =
-                self.cones.iter().map(|&(center, radius)| cap(receiver.position, center, radius)).collect();
+            let cone = |&(center, radius): &(Vec3, f32)| cone_to_sphere(receiver.position, center, radius);
+            let cones: Vec<(Vec3, f32)> = self.spheres.iter().map(cone).collect();
             ends.clear();
-            let mut all = 0.0;
-            for (_, size) in &caps {
-                all += size;
-                ends.push(all);
+            let mut total = 0.0;
+            for (_, size) in &cones {
+                total += size;
+                ends.push(total);
             }
-            let aimed = ray % 2 == 1 && all > 0.0;
-            let direction = if aimed {
-                let place = u * all;
-                let chosen = ends.partition_point(|&end| end <= place).min(caps.len() - 1);
-                let (axis, size) = caps[chosen];
-                let before = ends[chosen] - size;
-                in_cap(axis, size, ((place - before) / size).clamp(0.0, 1.0), v)
+            let is_aimed = ray % 2 == 1 && total > 0.0;
+            let direction = if is_aimed {
+                let place = u * total;
+                let chosen = ends.partition_point(|&end| end <= place).min(cones.len() - 1);
+                let (axis, size) = cones[chosen];
+                let start = ends[chosen] - size;
+                direction_in_cone(axis, size, ((place - start) / size).clamp(0.0, 1.0), v)
             } else {
                 cosine_about(receiver.geometric_normal, u, v)
             };
@@ -294,13 +304,14 @@ impl<'a> IndirectChange<'a> {
                 estimate.add([Vec3::ZERO; 2], 0.0);
                 continue;
             }
-            let by_cosine = cosine / PI;
-            let within = caps.iter().filter(|(axis, size)| 1.0 - direction.dot(*axis) <= *size).count();
-            // Rounding puts none outside that it was aimed at.
-            let within = within.max(usize::from(aimed));
-            let by_caps = if all > 0.0 { within as f32 / (TAU * all) } else { by_cosine };
-            let weight = by_cosine / (0.5 * by_cosine + 0.5 * by_caps);
-            match self.along(receiver.origin, direction, light) {
+            // Probability densities of both strategies. Cones may overlap.
+            let cosine_density = cosine / PI;
+            let containing = cones.iter().filter(|(axis, size)| 1.0 - direction.dot(*axis) <= *size).count();
+            // A direction that was sampled in a cone counts as inside it, whatever rounding says.
+            let containing = containing.max(usize::from(is_aimed));
+            let cone_density = if total > 0.0 { containing as f32 / (TAU * total) } else { cosine_density };
+            let weight = cosine_density / (0.5 * cosine_density + 0.5 * cone_density);
+            match self.change_along(receiver.origin, direction, light) {
                 Some(range) => estimate.add(range, weight),
                 None => {
                     estimate.add([Vec3::ZERO; 2], 0.0);
@@ -311,8 +322,8 @@ impl<'a> IndirectChange<'a> {
         estimate
     }
 
-    /// By how much what comes along a ray has changed, times π. None if that cannot be told.
-    fn along(&self, origin: Vec3, direction: Vec3, light: PatchLight<'_>) -> Option<Range> {
+    /// The change of the light that arrives along a ray, as radiance times π. `None` if it is not known.
+    fn change_along(&self, origin: Vec3, direction: Vec3, light: PatchLight<'_>) -> Option<Range> {
         let is_new =
             |triangle: u32| self.changes.changed[self.scene.triangles[triangle as usize].object as usize];
         let is_black = |hit| matches!(hit, SurfaceHit::Back | SurfaceHit::Inside);
@@ -322,52 +333,60 @@ impl<'a> IndirectChange<'a> {
             true => self.scene.first_surface(origin, direction, |triangle| !is_new(triangle)),
             false => now,
         };
-        let (was, more, distance) = match behind {
+        // The light of what is behind new objects: before, its change, and how far away it is.
+        let (before, change, distance) = match behind {
             SurfaceHit::Lit { triangle, side, at, distance } => {
-                let (was, more) = self.at(triangle, side, at, light)?;
-                (was, more, distance)
+                let (before, change) = self.exitance_change(triangle, side, at, light)?;
+                (before, change, distance)
             }
             SurfaceHit::None => {
-                let was = self.changes.former.sky;
-                (was, [self.sky - was; 2], f32::INFINITY)
+                let before = self.changes.former.sky;
+                (before, [self.sky - before; 2], f32::INFINITY)
             }
             SurfaceHit::Back | SurfaceHit::Inside => (Vec3::ZERO, [Vec3::ZERO; 2], f32::INFINITY),
         };
-        let arrives = match now {
+        let after = match now {
             SurfaceHit::Lit { triangle, side, at, .. } if shows_new => {
                 let patch = light.patches.at(triangle, side, at);
                 [patch.map_or(Vec3::ZERO, |patch| light.exitance[patch.place()]); 2]
             }
-            // The back of something new.
+            // The back of a new object.
             _ if is_black(now) => [Vec3::ZERO; 2],
-            _ => more.map(|more| was + more),
+            _ => change.map(|change| before + change),
         };
-        let (mut least, mut most) = (was, was);
-        for [darkest, brightest] in self.crossed(origin, direction, distance) {
+        // Objects that are gone may have been hit before, instead of what is behind them.
+        let (mut least, mut most) = (before, before);
+        for [darkest, brightest] in self.former_exitances_along(origin, direction, distance) {
             (least, most) = (least.min(darkest), most.max(brightest));
         }
-        Some([arrives[0] - most, arrives[1] - least])
+        Some([after[0] - most, after[1] - least])
     }
 
-    /// What left the objects whose boxes a ray crosses on its way.
-    fn crossed(&self, origin: Vec3, direction: Vec3, distance: f32) -> impl Iterator<Item = Range> {
+    /// Light that left the objects of the former scene whose boxes a ray crosses within a distance.
+    fn former_exitances_along(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        distance: f32,
+    ) -> impl Iterator<Item = Range> {
         let crosses = move |b: &ChangedBox| {
             let (mut from, mut to) = (0.0f32, distance);
             for axis in 0..3 {
                 let inverse = 1.0 / direction[axis];
                 let (a, b) =
                     ((b.low[axis] - origin[axis]) * inverse, (b.high[axis] - origin[axis]) * inverse);
-                // Not a number where the ray runs in the plane of a side: it then does not narrow the range.
+                // Both are NaN for a ray in the plane of a flat box, and `min` and `max` ignore them. (Only one is NaN
+                // for a ray in the plane of a side of another box: the ray then counts as outside.)
                 from = from.max(a.min(b));
                 to = to.min(a.max(b));
             }
             from <= to
         };
-        self.changes.boxes.iter().filter_map(move |b| b.left.filter(|_| crosses(b)))
+        self.changes.boxes.iter().filter_map(move |b| b.former_exitance.filter(|_| crosses(b)))
     }
 
-    /// What left a point of an unchanged surface before, and by how much more leaves it now. None if that cannot be told.
-    fn at(
+    /// Light that left a point of an unchanged surface before, and its change, W/m². `None` if that is not known.
+    fn exitance_change(
         &self,
         triangle: u32,
         side: Side,
@@ -383,7 +402,7 @@ impl<'a> IndirectChange<'a> {
         }
         let reflectance = light.patches.list[patch].reflectance;
         let bounced = light.change.get(patch).map_or([Vec3::ZERO; 2], |range| range.map(|c| reflectance * c));
-        // Of what no texel shows the patches tell the light as it is now.
+        // Where no texel shows the surface, its former light is taken to be the patch's present light.
         let exitance = light.exitance[patch];
         let scene_triangle = &self.scene.triangles[triangle as usize];
         let map = &self.layout.maps[scene_triangle.object as usize];
@@ -395,9 +414,9 @@ impl<'a> IndirectChange<'a> {
         }
         let texel = map.first + (y * map.width + x) as usize;
         let before = self.changes.former_light[texel];
-        // Hidden until now: whatever hid it was a box on the ray's way.
-        let was = if before.is_nan() { exitance } else { reflectance * before };
+        // A texel without former light was hidden: the object that hid it is gone, and the ray crosses its box.
+        let before = if before.is_nan() { exitance } else { reflectance * before };
         let direct = reflectance * self.direct[texel];
-        Some((was, bounced.map(|bounced| bounced + direct)))
+        Some((before, bounced.map(|bounced| bounced + direct)))
     }
 }

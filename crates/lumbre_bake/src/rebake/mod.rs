@@ -1,17 +1,23 @@
-//! Baking again what a change can have affected, and keeping the rest: after a crate has moved, the far room's samples are still good.
-//! Not the bake: that takes what is kept as if it had computed it.
+//! Baking again after a change: keeps the samples of a former bake that the change hardly affects, such as those of a
+//! room far from a crate that has moved. The rest is baked by the usual stages, which take what is kept as if they had
+//! computed it.
 //!
 //! ```text
-//!   Samples of the former bake ─► changes ─► which objects moved, came, went ──► boxes that light may now pass, or no longer
+//!   samples of the former bake ─► changes ─► objects that moved, came or went ─► boxes that block light, or did before
 //!                                   │
-//!                                   ├─► relit:  texels whose ways to a lamp lead through such a box: direct light anew
+//!                                   ├─► direct_light_invalidation: texels with a path to a light through such a box
+//!                                   │       get new direct light
 //!                                   │
-//!                                   └─► change: a linear estimate of how the light by bounces changes, patches first, then texels
-//!                                          └─► choice: texels where that, with what was reuse_error before, is small beside the error asked for
+//!                                   └─► indirect_change: a linear estimate of the change of the light by bounces,
+//!                                       │   first of patches, then of texels
+//!                                       └─► choice: keeps the texels whose estimated change, together with their
+//!                                               reuse_error so far, is small beside the requested error
 //! ```
 //!
-//! Light is linear: the change of the light by bounces obeys the radiosity equation of the new scene, with the change that is seen at first hand as
-//! its source (what the boxes hide or show, and what direct light has changed). That is solved on the patches, so that it brings no noise where nothing changes. What is reuse_error is added to the stated error.
+//! Light is linear: the change of the light by bounces obeys the radiosity equation of the new scene, with the
+//! immediate changes as its source (what the boxes hide or reveal, and what has changed in direct light). The equation
+//! is solved on patches, so that there is no noise where nothing changes. The estimated change of everything that is
+//! kept is added to the stated error, as its `reuse_error`.
 
 mod changed_box;
 mod changes;

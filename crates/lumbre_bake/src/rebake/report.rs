@@ -1,11 +1,11 @@
-//! What was kept of a former bake, for people and programs. Not the keeping.
+//! The report on what was kept of a former bake. What is kept is chosen in `changes` and `choice`.
 
 use super::changes::Changes;
 use crate::coverage::footprint::Texel;
 use crate::final_gather::reused_gather::ReusedGather;
 use crate::report::{BakeReport, RebakeReport};
 
-/// Of a bake that kept something, or tried to. `report` has the mean irradiance already.
+/// The report of a bake with usable former samples. `report` must hold the mean irradiance already.
 pub(crate) fn rebake_report(
     changes: &Changes<'_>,
     texels: &[Texel],
@@ -14,13 +14,13 @@ pub(crate) fn rebake_report(
 ) -> RebakeReport {
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count();
     let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
-    let reuse_error = kept.map_or(0.0, |kept| kept.error(open));
+    let error = kept.map_or(0.0, |kept| kept.error(open));
     RebakeReport {
         whole: String::new(),
         changed: changes.names.clone(),
         texels: open,
         relit: changes.relit(texels),
         gathered: kept.map_or(0, |kept| open - kept.count()),
-        neglected: if mean > 0.0 { reuse_error / mean } else { 0.0 },
+        neglected: if mean > 0.0 { error / mean } else { 0.0 },
     }
 }

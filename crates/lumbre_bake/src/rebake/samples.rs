@@ -1,5 +1,5 @@
-//! What a bake has found of every texel, before it became a map: what the next bake of a changed scene can keep. Not a file of it: that is
-//! `samples_file`.
+//! The samples of every texel of a bake, before they became a map, from which the next bake of a changed scene can keep
+//! some. The file format is in `samples_file`.
 
 use crate::rebake::fingerprints::{fingerprint, first_triangles};
 use glam::Vec3;
@@ -18,13 +18,14 @@ use crate::sources::light_sources::Sources;
 #[derive(Clone, Debug)]
 pub struct Samples(pub(crate) Content);
 
-/// What is in there.
+/// The contents of [`Samples`].
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Content {
-    /// Of what was baked.
+    /// Hash of what was baked.
     pub content: ContentHash,
-    /// Of that, and of the samples that were kept for it.
+    /// Hash of that and of all former samples that were kept for it.
     pub identity: ContentHash,
+    /// Hash of the options and of the baker's version.
     pub sampling: ContentHash,
     pub lights: ContentHash,
     /// Irradiance of an unhidden sky, W/m².
@@ -35,42 +36,42 @@ pub(crate) struct Content {
     pub objects: Vec<ObjectSamples>,
 }
 
-/// Of an object.
+/// The samples of an object, and what tells whether it has changed.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct ObjectSamples {
     pub hash: ContentHash,
     pub name: String,
-    /// The box around it, canonical units.
+    /// Bounding box, canonical units.
     pub low: Vec3,
     pub high: Vec3,
-    /// What of it shines, in one number; 0 for nothing.
+    /// Hash of its emitters; 0 if it has none.
     pub emission: u32,
-    /// What leaves it without emission, W/m², by channel: the least and the most of its patches.
+    /// Light that leaves it, without its emission, W/m²: the least and the most of its patches, by channel.
     pub exitance: [Vec3; 2],
-    /// Where its texels are on it, in one number.
+    /// Hash of where its texels are on it.
     pub layout: u32,
-    /// In the order of their cells.
+    /// Ascending by cell.
     pub texels: Vec<TexelSamples>,
 }
 
-/// Of a texel that is not hidden.
+/// The samples of a texel that is not hidden.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct TexelSamples {
-    /// Column and row in one number, as in its map.
+    /// Index of the texel in its map: row times width plus column.
     pub cell: u32,
-    /// What it shows of its object, in one number.
+    /// Hash of what it shows of its object.
     pub footprint: u32,
     pub direct: Direct,
     #[serde(with = "settled")]
     pub gathered: GatherSums,
     /// Irradiance by bounces that the map showed, W/m².
     pub bounced: Vec3,
-    /// By how much that may have changed since it was gathered, W/m².
+    /// By how much that may differ from the true light because of changes since it was gathered, W/m².
     pub reuse_error: f32,
 }
 
 impl TexelSamples {
-    /// Whether all of it are numbers that a bake can go on with.
+    /// Whether all values are finite and in their ranges, so that a bake can use them.
     pub fn is_sound(&self) -> bool {
         let Self { cell: _, footprint: _, direct, gathered, bounced, reuse_error } = self;
         let GatherSums {
@@ -98,19 +99,19 @@ impl TexelSamples {
 }
 
 impl Samples {
-    /// The hash of what was baked, and of all that was kept for it from former bakes.
+    /// The hash of what was baked and of all samples that were kept from former bakes.
     pub fn identity(&self) -> &ContentHash {
         &self.0.identity
     }
 
-    /// Texels of which there are samples.
+    /// Number of texels with samples.
     pub fn texels(&self) -> usize {
         self.0.objects.iter().map(|object| object.texels.len()).sum()
     }
 }
 
 impl GatherSums {
-    /// As if every sample had weighed the same: the estimates stay what they are, and what is gathered later adds to them.
+    /// The same estimates, as if every sample had had the weight 1; samples that are gathered later add to them.
     pub fn settled(&self) -> Self {
         let count = self.samples as f32;
         let sums = self.estimates().map(|estimate| estimate * count);
@@ -119,7 +120,7 @@ impl GatherSums {
 }
 
 impl Weights {
-    /// Of samples that all weighed 1 and brought the same light.
+    /// For samples of weight 1 that all brought the same light.
     pub fn of_equal(sum: Vec3, samples: u32) -> Self {
         let count = samples as f32;
         let light_squares = (sum.element_sum() / 3.0).powi(2) / count.max(1.0);
@@ -127,7 +128,7 @@ impl Weights {
     }
 }
 
-/// What a bake has found, sorted by object. `reuse_error` is empty where nothing was kept.
+/// Collects the results of a bake, by covered texel, as samples by object. `reuse_error` is empty if nothing was kept.
 pub(crate) struct SampleCollector<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
@@ -139,7 +140,7 @@ pub(crate) struct SampleCollector<'a> {
 }
 
 impl SampleCollector<'_> {
-    /// The samples of the whole. `exitance` is the least and most of each object, or empty.
+    /// The samples of the whole bake. `exitance` holds the least and the most of each object, or is empty.
     pub fn samples(
         &self,
         identity: ContentHash,
@@ -173,13 +174,13 @@ impl SampleCollector<'_> {
         })
     }
 
-    /// The texels of every object.
+    /// The samples of each object's texels.
     fn by_object(&self) -> Vec<Vec<TexelSamples>> {
         let first = first_triangles(self.scene, self.layout);
-        let mut sorted: Vec<Vec<TexelSamples>> = vec![Vec::new(); self.layout.maps.len()];
+        let mut by_object: Vec<Vec<TexelSamples>> = vec![Vec::new(); self.layout.maps.len()];
         for (index, texel) in self.texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
             let object = texel.object as usize;
-            let own = TexelSamples {
+            let samples = TexelSamples {
                 cell: texel.y * self.layout.maps[object].width + texel.x,
                 footprint: fingerprint(texel, first[object]),
                 direct: self.direct[index],
@@ -187,12 +188,12 @@ impl SampleCollector<'_> {
                 bounced: self.bounced.get(index).copied().unwrap_or_default(),
                 reuse_error: self.reuse_error.get(index).copied().unwrap_or_default(),
             };
-            // What overflows is not worth keeping.
-            if own.is_sound() {
-                sorted[object].push(own);
+            // Values that overflowed are not worth keeping.
+            if samples.is_sound() {
+                by_object[object].push(samples);
             }
         }
-        sorted
+        by_object
     }
 }
 

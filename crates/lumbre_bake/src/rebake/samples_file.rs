@@ -1,14 +1,16 @@
-//! Samples in a file, between two bakes. Not what they are for.
+//! The file format of samples. What they are for is described in the parent module.
 //!
 //! ```text
 //!   magic      8 bytes   "LUMBRESA"
 //!   version    u32       VERSION; everything is little endian
 //!   checksum  32 bytes   BLAKE3 of all that follows
-//!   length     u64       bytes of what the rest holds, which is a Zstandard frame: two thirds of it, as most of its digits are noise
-//!   `Content`, field by field, in the format of postcard; a texel takes some 150 bytes
+//!   length     u64       of the uncompressed rest, in bytes
+//!   content              a Zstandard frame, two thirds of that length, as most digits are noise: `Content`, field by
+//!                        field, in the format of postcard; a texel takes some 150 bytes
 //! ```
 //!
-//! Nothing is allocated by a count that the bytes do not hold, nor more than the length; a file that is cut short or damaged is named so.
+//! Reading never allocates more than the file's bytes can hold or the length states; a file that is cut short or
+//! damaged gives an error that says so.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -20,10 +22,10 @@ use crate::checkpoint::replace_file::replace_file;
 use crate::scene::Canonical;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
-/// The version of the format: another is not read.
+/// The version of the format. Files of other versions are not read.
 const VERSION: u32 = 5;
 const CHECKSUM: usize = 32;
-/// Of Zstandard: higher ones take longer and save no more.
+/// Compression level of Zstandard: higher ones take longer and save no more.
 const LEVEL: i32 = 1;
 
 /// Why samples cannot be read or written. A bake can do without them.
@@ -48,12 +50,12 @@ pub enum SamplesError {
 }
 
 impl Samples {
-    /// Reads what [`Samples::write`] wrote.
+    /// Reads a file that [`Samples::write`] wrote.
     ///
     /// # Errors
-    /// [`SamplesError`]: it is not there, not of this kind or version, or damaged.
+    /// [`SamplesError`] if the file cannot be read, is not of this format or version, or is damaged.
     pub fn read(path: &Path) -> Result<Self, SamplesError> {
-        // Opening a pipe would wait for ever.
+        // Opening a pipe could block forever.
         if !std::fs::metadata(path)?.is_file() {
             return Err(SamplesError::Foreign);
         }
@@ -74,25 +76,26 @@ impl Samples {
             let Canonical { center, scale } = content.space;
             let positive = |number: f64| number.is_finite() && number > 0.0;
             let space = positive(content.density) && positive(scale) && center.is_finite();
-            // No bake writes what is not a number; a map of it could not be mended.
+            // No bake writes NaN or infinities, and a bake that read them would spread them over its maps.
             let mut texels = content.objects.iter().flat_map(|object| &object.texels);
             space && content.sky.is_finite() && texels.all(TexelSamples::is_sound)
         });
         content.map(Self).ok_or(SamplesError::Damaged)
     }
 
-    /// Writes a file, whole under its name at once.
+    /// Writes a file atomically: under its name there is never an incomplete file.
     ///
     /// # Errors
-    /// [`SamplesError::Io`]; what was there is then as it was.
+    /// [`SamplesError::Io`]; a file that was there before is then unchanged.
     pub fn write(&self, path: &Path) -> Result<(), SamplesError> {
         let content = packed(&record::written(&self.0).map_err(io::Error::other)?)?;
         replace_file(path, |temporary| {
             let mut file = loop {
-                // Not truncated before it is ours: another process may be writing it.
+                // It is not truncated until it is locked: another process may be writing it.
                 let file = OpenOptions::new().write(true).create(true).truncate(false).open(temporary)?;
                 lock(&file)?;
-                // Whoever had it has renamed it meanwhile: then it is the finished file.
+                // If the process that held the lock has renamed the file meanwhile, this is its finished file: try
+                // again.
                 if is_at(&file, temporary)? {
                     break file;
                 }
@@ -109,14 +112,14 @@ impl Samples {
     }
 }
 
-/// A length and what is of that length, compressed.
+/// The length of the content, and the content compressed.
 fn packed(content: &[u8]) -> io::Result<Vec<u8>> {
     let mut packed = (content.len() as u64).to_le_bytes().to_vec();
     packed.extend(zstd::bulk::compress(content, LEVEL)?);
     Ok(packed)
 }
 
-/// What a frame holds, if that is as long as it should be.
+/// The content of a Zstandard frame; `None` if it does not have the given length.
 fn unpacked(frame: &[u8], length: u64) -> Option<Vec<u8>> {
     let mut unpacked = Vec::new();
     zstd::stream::read::Decoder::new(frame)
@@ -127,27 +130,28 @@ fn unpacked(frame: &[u8], length: u64) -> Option<Vec<u8>> {
     (unpacked.len() as u64 == length).then_some(unpacked)
 }
 
-/// Whether a path still leads to an open file.
+/// Whether a path still refers to an open file.
 fn is_at(file: &File, path: &Path) -> io::Result<bool> {
-    let there = match std::fs::metadata(path) {
+    let at_path = match std::fs::metadata(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
         other => other?,
     };
     #[cfg(unix)]
     {
         use std::os::unix::fs::MetadataExt;
-        let own = file.metadata()?;
-        Ok((own.dev(), own.ino()) == (there.dev(), there.ino()))
+        let open = file.metadata()?;
+        Ok((open.dev(), open.ino()) == (at_path.dev(), at_path.ino()))
     }
     #[cfg(not(unix))]
     {
-        // Elsewhere a file that is open is not renamed.
-        let _ = (file, there);
+        // On other systems an open file cannot be renamed.
+        let _ = (file, at_path);
         Ok(true)
     }
 }
 
-/// Waits for whoever writes it; some network folders know no locks.
+/// Locks a file, waiting for any other process that writes it. Some network file systems do not support locks; there it
+/// does nothing.
 fn lock(file: &File) -> io::Result<()> {
     match file.lock() {
         Err(error) if error.kind() == io::ErrorKind::Unsupported => Ok(()),

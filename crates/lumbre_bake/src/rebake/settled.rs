@@ -1,4 +1,5 @@
-//! How samples of a finished bake are written: without the weights, which follow from the rest once they are settled, and without the rays. Not what they are.
+//! How the gathered light of a finished bake is serialized: without the weights, which follow from the other fields
+//! once samples are settled ([`GatherSums::settled`]), and without the number of rays.
 
 use glam::Vec3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -6,9 +7,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::denoise::replicates::REPLICATES;
 use crate::final_gather::gather_sums::{GatherSums, Weights};
 
-/// Of serde's `with`: the fields that are kept, in the order in which [`deserialize`] takes them.
-pub(super) fn serialize<S: Serializer>(own: &GatherSums, serializer: S) -> Result<S::Ok, S::Error> {
-    // Whoever adds a field decides here whether it is kept.
+/// For serde's `with`: writes the fields that are kept, in the order in which [`deserialize`] reads them.
+pub(super) fn serialize<S: Serializer>(gathered: &GatherSums, serializer: S) -> Result<S::Ok, S::Error> {
+    // Destructured without `..`, so that a new field forces a decision whether it is kept.
     let GatherSums {
         sums,
         weights: _,
@@ -21,12 +22,12 @@ pub(super) fn serialize<S: Serializer>(own: &GatherSums, serializer: S) -> Resul
         inverse_distances,
         samples,
         rays: _,
-    } = own;
+    } = gathered;
     let rays = (patch_errors, texel_variances, texel_reads, inverse_distances);
     (sums, samples, rays, (checks, differences, squared_differences)).serialize(serializer)
 }
 
-/// Of serde's `with`.
+/// For serde's `with`.
 pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<GatherSums, D::Error> {
     let (sums, samples, rays, of_checks) = Deserialize::deserialize(deserializer)?;
     let (patch_errors, texel_variances, texel_reads, inverse_distances) = rays;
