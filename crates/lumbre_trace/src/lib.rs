@@ -50,6 +50,7 @@ mod comparison;
 mod coplanar;
 mod direct_light;
 mod display;
+mod emitter_tree;
 mod error;
 mod estimator;
 mod film;

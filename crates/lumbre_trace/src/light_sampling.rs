@@ -1,6 +1,6 @@
 //! Light sampling for paths: chooses one lamp in proportion to its unoccluded light at a surface point, and
-//! one point on the emissive triangles in proportion to their power. Visibility is not tested here. Where
-//! there are many lamps, `light_tree` first selects the few that are weighed one by one.
+//! one point on the emissive triangles, of which `emitter_tree` chooses one. Visibility is not tested here.
+//! Where there are many lamps, `light_tree` first selects the few that are weighed one by one.
 
 use std::f64::consts::PI;
 
@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3};
 use lumbre_optics::{LightKind, LightSample, evaluate_light};
 use lumbre_scene::EmissiveLight;
 
+use crate::emitter_tree::{EmitterBounds, EmitterTree};
 use crate::light_tree::LightTree;
 use crate::lobe_sampling::within_cone;
 use crate::metering::luminance;
@@ -18,15 +19,15 @@ use crate::surface_point::SurfacePoint;
 #[derive(Debug)]
 pub(crate) struct LightSampler {
     emitters: Vec<Emitter>,
-    /// Cumulative distribution of the emitters by power, ending with 1.
-    distribution: Vec<f64>,
+    /// Chooses one of the emitters.
+    emitter_tree: EmitterTree,
     /// Indices of all lights, which are weighed one by one if there is no tree.
     lamps: Vec<usize>,
     /// Selects a few lamps where there are more than [`FEW_LAMPS`].
     tree: Option<LightTree>,
-    /// Density per square metre with which a point of each triangle of the scene is chosen, by the triangle's
-    /// index; empty without emitters.
-    densities: Vec<f64>,
+    /// Index of the emitter that each triangle of the scene is, by the triangle's index, or [`NO_EMITTER`];
+    /// empty without emitters.
+    emitter_of: Vec<u32>,
 }
 
 /// An emissive triangle.
@@ -68,6 +69,8 @@ pub(crate) struct EmitterSample {
     pub density: f64,
 }
 
+/// Marks triangles that emit nothing.
+const NO_EMITTER: u32 = u32::MAX;
 /// Up to this many lights are weighed one by one at every point.
 const FEW_LAMPS: usize = 16;
 /// Lower bound of the emissive texture's luminance where a triangle is weighed: a texture that is dark at the
@@ -82,15 +85,15 @@ const LARGEST_SINE: f64 = 0.99;
 impl LightSampler {
     pub fn new(scene: &Scene) -> Self {
         let mut emitters = Vec::new();
-        let mut powers = Vec::new();
-        let mut triangles = Vec::new();
+        let mut bounds = Vec::new();
+        let mut emitter_of = Vec::new();
         for triangle in 0..scene.geometry.triangle_count() as u32 {
             let (index, number) = scene.geometry.owner(triangle);
             let object = &scene.objects[index];
-            let [front, back] = EmissiveLight::radiance(&object.material).map(|color| color.as_dvec3());
-            let shines = luminance(front) + luminance(back);
+            let sides = EmissiveLight::radiance(&object.material).map(|color| luminance(color.as_dvec3()));
+            let [front, back] = sides;
             // Emitters with alpha are not sampled: only paths that happen to hit them find their light.
-            if shines <= 0.0 || matches!(object.passage(), Passage::Cut | Passage::Covering) {
+            if front + back <= 0.0 || matches!(object.passage(), Passage::Cut | Passage::Covering) {
                 continue;
             }
             let first = 3 * number as usize;
@@ -99,29 +102,26 @@ impl LightSampler {
             let cross = (b - a).cross(c - a);
             let area = 0.5 * cross.length();
             if area > 0.0 && area.is_finite() {
+                let normal = cross / (2.0 * area);
                 let tint = luminance(tint(object, number, [1.0 / 3.0; 2])).max(MIN_TINT);
-                emitters.push(Emitter { object: index, number, corners, normal: cross / (2.0 * area), area });
-                powers.push(area * shines * tint);
-                triangles.push(triangle);
+                if emitter_of.is_empty() {
+                    emitter_of = vec![NO_EMITTER; scene.geometry.triangle_count()];
+                }
+                emitter_of[triangle as usize] = emitters.len() as u32;
+                emitters.push(Emitter { object: index, number, corners, normal, area });
+                bounds.push(EmitterBounds {
+                    low: a.min(b).min(c),
+                    high: a.max(b).max(c),
+                    power: area * (front + back) * tint,
+                    normal: if front > 0.0 { normal } else { -normal },
+                    two_sided: front > 0.0 && back > 0.0,
+                });
             }
         }
-        let total: f64 = powers.iter().sum();
-        let mut sum = 0.0;
-        let distribution = powers.iter().map(|power| {
-            sum += power / total;
-            sum
-        });
-        let distribution: Vec<f64> = distribution.collect();
-        let mut densities = Vec::new();
-        if !emitters.is_empty() {
-            densities = vec![0.0; scene.geometry.triangle_count()];
-            for ((triangle, emitter), power) in triangles.iter().zip(&emitters).zip(&powers) {
-                densities[*triangle as usize] = power / total / emitter.area;
-            }
-        }
+        let emitter_tree = EmitterTree::new(&bounds);
         let lamps = (0..scene.lights.len()).collect();
         let tree = (scene.lights.len() > FEW_LAMPS).then(|| LightTree::new(scene));
-        Self { emitters, distribution, lamps, tree, densities }
+        Self { emitters, emitter_tree, emitter_of, lamps, tree }
     }
 
     /// Samples a lamp for a point, and a direction towards it; `None` if no lamp sends light there.
@@ -186,9 +186,8 @@ impl LightSampler {
         choice: f64,
         numbers: DVec2,
     ) -> Option<EmitterSample> {
-        let last = self.emitters.len().checked_sub(1)?;
-        let place = self.distribution.partition_point(|sum| *sum <= choice).min(last);
-        let emitter = &self.emitters[place];
+        let (chosen, chance) = self.emitter_tree.choose(point.position, point.normal, choice)?;
+        let emitter = &self.emitters[chosen];
         let root = numbers.x.sqrt();
         let weights = [root * (1.0 - numbers.y), root * numbers.y];
         let [a, b, c] = emitter.corners;
@@ -202,8 +201,6 @@ impl LightSampler {
         let cosine = -direction.dot(emitter.normal);
         let object = &scene.objects[emitter.object];
         let radiance = emitted(object, emitter.number, weights, cosine > 0.0);
-        let before = if place == 0 { 0.0 } else { self.distribution[place - 1] };
-        let chance = self.distribution[place] - before;
         let density = chance / emitter.area * distance * distance / cosine.abs();
         (radiance != DVec3::ZERO && density.is_finite() && density > 0.0).then_some(EmitterSample {
             object: emitter.object,
@@ -214,11 +211,21 @@ impl LightSampler {
         })
     }
 
-    /// Returns the density per steradian with which [`emitter`](Self::emitter) chooses a point of a triangle,
-    /// seen at a distance and at a cosine to its normal; 0 for triangles that are never chosen.
-    pub fn density(&self, triangle: Option<u32>, distance: f64, cosine: f64) -> f64 {
-        let density = triangle.and_then(|triangle| self.densities.get(triangle as usize)).copied();
-        density.unwrap_or(0.0) * distance * distance / cosine.abs().max(1e-12)
+    /// Returns the density per steradian with which [`emitter`](Self::emitter) chooses a point of a triangle
+    /// for a surface point and the normal there, seen at a distance and at a cosine to the triangle's normal; 0
+    /// for triangles that are never chosen.
+    pub fn density(
+        &self,
+        triangle: Option<u32>,
+        (point, normal): (DVec3, DVec3),
+        distance: f64,
+        cosine: f64,
+    ) -> f64 {
+        let emitter = triangle.and_then(|triangle| self.emitter_of.get(triangle as usize)).copied();
+        let Some(emitter) = emitter.filter(|&emitter| emitter != NO_EMITTER) else { return 0.0 };
+        let chance = self.emitter_tree.chance(emitter as usize, point, normal);
+        let area = self.emitters[emitter as usize].area;
+        chance / area * distance * distance / cosine.abs().max(1e-12)
     }
 }
 

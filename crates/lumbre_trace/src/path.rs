@@ -55,13 +55,25 @@ struct Walk {
     radiance: DVec3,
     /// The terms that the radiance is the sum of, if they are wanted.
     terms: LightTerms,
-    /// Density per steradian with which the last direction was sampled, and metres since that scattering;
-    /// `None` after the camera, a mirror or glass, whose directions are not sampled.
-    last: Option<(f64, f64)>,
+    /// The last point at which a direction was sampled; `None` after the camera, a mirror or glass, whose
+    /// directions are not sampled.
+    last: Option<Scattering>,
     reflections: u32,
     rays: u32,
     /// Whether it has met nothing so far but thin sheets and partly covering surfaces.
     first: bool,
+}
+
+/// A point at which the path's direction was sampled.
+#[derive(Clone, Copy)]
+struct Scattering {
+    position: DVec3,
+    /// Shading normal.
+    normal: DVec3,
+    /// Density per steradian with which the direction was sampled.
+    density: f64,
+    /// Metres of the path since then.
+    distance: f64,
 }
 
 /// Whether a path goes on.
@@ -127,7 +139,7 @@ impl<'a> Paths<'a> {
         };
         let object = &scene.objects[point.object];
         walk.throughput *= walk.media.transmittance(point.distance);
-        let since = walk.last.map_or(0.0, |(_, before)| before) + point.distance;
+        let since = walk.last.map_or(0.0, |last| last.distance) + point.distance;
         if point.coverage < 1.0 && numbers.next() >= point.coverage {
             return walk.goes_straight(&point, since);
         }
@@ -158,7 +170,7 @@ impl<'a> Paths<'a> {
     /// Adds the emission of the surface: all of it after the camera, a mirror or glass, where light sampling
     /// cannot find it, and otherwise weighted by the balance heuristic.
     fn add_emission(&self, walk: &mut Walk, point: &SurfacePoint, place: &Place, since: f64) {
-        let Some((density, _)) = walk.last else {
+        let Some(last) = walk.last else {
             walk.brings(Source::Object(point.object), walk.reflections, point.emission);
             return;
         };
@@ -171,8 +183,9 @@ impl<'a> Paths<'a> {
             return;
         }
         let cosine = point.geometric.dot(walk.ray.direction);
-        let asked = self.lights.density(point.triangle, since, cosine);
-        let share = density / (density + asked);
+        let receiver = (last.position, last.normal);
+        let by_lights = self.lights.density(point.triangle, receiver, since, cosine);
+        let share = last.density / (last.density + by_lights);
         walk.brings(Source::Object(point.object), walk.reflections, radiance * share);
     }
 
@@ -227,7 +240,9 @@ impl<'a> Paths<'a> {
         // The density that the balance heuristic compares: the probability of choosing the lobes at all,
         // times their density.
         let chance = density * local / total;
-        walk.turns(shadow_ray(point, direction), Some(chance), numbers)
+        let scattering =
+            Scattering { position: point.position, normal: point.normal, density: chance, distance: 0.0 };
+        walk.turns(shadow_ray(point, direction), Some(scattering), numbers)
     }
 
     /// Next-event estimation: adds the light of one sampled lamp and of one sampled emissive triangle.
@@ -314,16 +329,16 @@ impl Walk {
     fn goes_straight(&mut self, point: &SurfacePoint, since: f64) -> Next {
         self.farthest -= point.distance;
         self.ray = SpaceRay::leaving(point.position, self.ray.direction, point.geometric, point.extent);
-        self.last = self.last.map(|(density, _)| (density, since));
+        self.last = self.last.map(|last| Scattering { distance: since, ..last });
         Next::Goes
     }
 
-    /// Goes on along a new ray, unless Russian roulette ends the path. `density` is `None` for mirrors and
-    /// glass.
-    fn turns(&mut self, ray: SpaceRay, density: Option<f64>, numbers: &mut Numbers) -> Next {
+    /// Goes on along a new ray, unless Russian roulette ends the path. `scattering` is `None` for mirrors
+    /// and glass.
+    fn turns(&mut self, ray: SpaceRay, scattering: Option<Scattering>, numbers: &mut Numbers) -> Next {
         self.ray = ray;
         self.farthest = f64::INFINITY;
-        self.last = density.map(|density| (density, 0.0));
+        self.last = scattering;
         self.reflections += 1;
         self.first = false;
         if self.throughput.max_element() <= 0.0 || !self.throughput.is_finite() {
