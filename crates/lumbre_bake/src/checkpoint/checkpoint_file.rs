@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::record::{self, Record};
-use super::replace_file::replace_file;
+use super::replace_file::{WhenBusy, replace_file};
 use super::{Checkpoint, VERSION};
 use crate::content_hash::ContentHash;
 use crate::error::CheckpointError;
@@ -307,14 +307,6 @@ fn begin(path: &Path, identity: &ContentHash) -> io::Result<(File, [u8; CHECKSUM
     let mut header = [MAGIC.as_slice(), &VERSION.to_le_bytes(), identity.bytes()].concat();
     let checksum = *blake3::hash(&header).as_bytes();
     header.extend_from_slice(&checksum);
-    let file = replace_file(path, |temporary| {
-        let mut file =
-            OpenOptions::new().read(true).write(true).create(true).truncate(true).open(temporary)?;
-        if let Err(TryLockError::WouldBlock) = file.try_lock() {
-            return Err(io::Error::new(io::ErrorKind::ResourceBusy, "another bake is beginning it"));
-        }
-        file.write_all(&header)?;
-        Ok(file)
-    })?;
+    let file = replace_file(path, WhenBusy::Fail, |file| file.write_all(&header))?;
     Ok((file, checksum))
 }

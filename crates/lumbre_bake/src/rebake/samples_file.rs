@@ -12,13 +12,12 @@
 //! Reading never allocates more than the file's bytes can hold or the length states; a file that is cut short or
 //! damaged gives an error that says so.
 
-use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
 use super::samples::{Content, Samples, TexelSamples};
 use crate::checkpoint::record;
-use crate::checkpoint::replace_file::replace_file;
+use crate::checkpoint::replace_file::{WhenBusy, replace_file};
 use crate::scene::Canonical;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
@@ -89,24 +88,12 @@ impl Samples {
     /// [`SamplesError::Io`]; a file that was there before is then unchanged.
     pub fn write(&self, path: &Path) -> Result<(), SamplesError> {
         let content = packed(&record::written(&self.0).map_err(io::Error::other)?)?;
-        replace_file(path, |temporary| {
-            let mut file = loop {
-                // It is not truncated until it is locked: another process may be writing it.
-                let file = OpenOptions::new().write(true).create(true).truncate(false).open(temporary)?;
-                lock(&file)?;
-                // If the process that held the lock has renamed the file meanwhile, this is its finished file: try
-                // again.
-                if is_at(&file, temporary)? {
-                    break file;
-                }
-            };
-            file.set_len(0)?;
+        replace_file(path, WhenBusy::Wait, |file| {
             file.write_all(MAGIC)?;
             file.write_all(&VERSION.to_le_bytes())?;
             file.write_all(blake3::hash(&content).as_bytes())?;
             file.write_all(&content)?;
-            file.sync_all()?;
-            Ok(file)
+            file.sync_all()
         })?;
         Ok(())
     }
@@ -128,33 +115,4 @@ fn unpacked(frame: &[u8], length: u64) -> Option<Vec<u8>> {
         .read_to_end(&mut unpacked)
         .ok()?;
     (unpacked.len() as u64 == length).then_some(unpacked)
-}
-
-/// Whether a path still refers to an open file.
-fn is_at(file: &File, path: &Path) -> io::Result<bool> {
-    let at_path = match std::fs::metadata(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
-        other => other?,
-    };
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::MetadataExt;
-        let open = file.metadata()?;
-        Ok((open.dev(), open.ino()) == (at_path.dev(), at_path.ino()))
-    }
-    #[cfg(not(unix))]
-    {
-        // On other systems an open file cannot be renamed.
-        let _ = (file, at_path);
-        Ok(true)
-    }
-}
-
-/// Locks a file, waiting for any other process that writes it. Some network file systems do not support locks; there it
-/// does nothing.
-fn lock(file: &File) -> io::Result<()> {
-    match file.lock() {
-        Err(error) if error.kind() == io::ErrorKind::Unsupported => Ok(()),
-        other => other,
-    }
 }
