@@ -1,5 +1,5 @@
-//! Writes a finished bake into the World: meshes with `uv1`, lightmaps, and the irradiance volume for moving objects. Apart from global
-//! transforms, which `from_world` updates, nothing else in this crate changes the World.
+//! Writes a finished bake into the World: meshes with `uv1`, lightmaps, and the irradiance volume for moving objects.
+//! Apart from global transforms, which `from_world` updates, nothing else in this crate changes the World.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -14,7 +14,8 @@ use crate::finish::baked_scene::BakedObject;
 use crate::finish::baked_scene::{BakedScene, TexelErrors};
 use crate::scene::{Entities, StaticScene};
 
-/// Gives every object its lightmap and removes those of earlier bakes from all other entities; from every entity, if nothing was baked.
+/// Gives every object its lightmap and removes those of earlier bakes from all other entities; from every entity, if
+/// nothing was baked.
 pub(crate) fn apply(world: &mut World, scene: &StaticScene, entities: &Entities, baked: &mut BakedScene) {
     let lit = if baked.objects.is_empty() { &[][..] } else { entities };
     remove_stale_lightmaps(world, lit);
@@ -47,7 +48,8 @@ pub(crate) fn apply(world: &mut World, scene: &StaticScene, entities: &Entities,
     replace_volume(world, baked.volume.take());
 }
 
-/// Removes the lightmaps of an earlier bake from all entities but those of `lit`, whose light would otherwise count twice.
+/// Removes the lightmaps of an earlier bake from all entities but those of `lit`, whose light would otherwise count
+/// twice.
 fn remove_stale_lightmaps(world: &mut World, lit: &[Vec<Entity>]) {
     let lit: HashSet<_> = lit.iter().flatten().collect();
     let mut mapped = world.query_filtered::<Entity, With<Lightmap>>();

@@ -1,4 +1,5 @@
-//! [`Bake`], the entry point of the crate, and `run`, which calls the stages in order. The stages themselves are in the folders beside.
+//! [`Bake`], the entry point of the crate, and `run`, which calls the stages in order. The stages themselves are in the
+//! folders beside.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -30,14 +31,17 @@ use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, 
 
 /// Configures and runs a bake, which computes the light on the static objects of a scene and stores it in lightmaps.
 ///
-/// [`Bake::run`] bakes the entities of a World that have a `Mesh` and a `StaticObject`, except hidden ones and those that are or are
-/// below a `DynamicObject`. Light comes from emissive materials, from the sky, and from lights whose `BakeMode` is `Static` (direct
-/// light and bounces are baked) or `Mixed` (only the bounces are). After the bake each of these entities has a mesh with lightmap
-/// coordinates in `uv1`, and a `Lightmap` of E/π. The primitives of a glTF node share one map.
+/// [`Bake::run`] bakes the entities of a World that have a `Mesh` and a `StaticObject`, except hidden ones and those
+/// that are or are below a `DynamicObject`. Light comes from emissive materials, from the sky, and from lights whose
+/// `BakeMode` is `Static` (direct light and bounces are baked) or `Mixed` (only the bounces are). After the bake each
+/// of these entities has a mesh with lightmap coordinates in `uv1`, and a `Lightmap` of E/π. The primitives of a glTF
+/// node share one map.
 ///
-/// If the bake fails or is cancelled, the World's meshes and lightmaps are unchanged; only global transforms have been updated.
+/// If the bake fails or is cancelled, the World's meshes and lightmaps are unchanged; only global transforms have been
+/// updated.
 ///
-/// The same World and options give the same bits on any number of threads, unless [`BakeOptions::time`] cuts the bake short.
+/// The same World and options give the same bits on any number of threads, unless [`BakeOptions::time`] cuts the bake
+/// short.
 ///
 /// ```
 /// # use bevy_ecs::world::World;
@@ -76,38 +80,42 @@ impl<'a> Bake<'a> {
         }
     }
 
-    /// Sets a callback that is called between chunks of work, and about twenty times a second during a long one. If it returns
-    /// `ControlFlow::Break`, the bake is cancelled.
+    /// Sets a callback that is called between chunks of work, and about twenty times a second during a long one. If it
+    /// returns `ControlFlow::Break`, the bake is cancelled.
     #[must_use]
     pub fn progress(self, progress: impl FnMut(Progress) -> ControlFlow<()> + Send + 'a) -> Self {
         Self { progress: Box::new(progress), ..self }
     }
 
-    /// Sets a token by which any thread can cancel the bake. A progress callback that returns `ControlFlow::Break` cancels it, too.
+    /// Sets a token by which any thread can cancel the bake. A progress callback that returns `ControlFlow::Break`
+    /// cancels it, too.
     #[must_use]
     pub fn cancel(self, token: &CancelToken) -> Self {
         Self { cancel: token.clone(), ..self }
     }
 
-    /// Saves intermediate results in a checkpoint, or resumes from one. A bake that was interrupted and resumed gives the same bits as
-    /// one that was not. If a checkpoint exists but cannot be resumed, the report's warnings say why.
+    /// Saves intermediate results in a checkpoint, or resumes from one. A bake that was interrupted and resumed gives
+    /// the same bits as one that was not. If a checkpoint exists but cannot be resumed, the report's warnings say why.
     #[must_use]
     pub fn checkpoint(self, checkpoint: impl Into<Option<&'a Checkpoint>>) -> Self {
         Self { checkpoint: checkpoint.into(), ..self }
     }
 
-    /// Passes the samples of a previous bake, so that texels whose light the scene's changes hardly affect are not computed again. The
-    /// report's [`rebake`](BakeReport::rebake) says what was reused, or why the whole scene had to be baked.
+    /// Passes the samples of a previous bake, so that texels whose light the scene's changes hardly affect are not
+    /// computed again. The report's [`rebake`](BakeReport::rebake) says what was reused, or why the whole scene had to
+    /// be baked.
     ///
-    /// The light of a reused texel may be off by the change that was neglected. This is part of the stated error and adds up over
-    /// successive bakes; once it is no longer small compared with the requested error, the texel is gathered anew.
+    /// The light of a reused texel may be off by the change that was neglected. This is part of the stated error and
+    /// adds up over successive bakes; once it is no longer small compared with the requested error, the texel is
+    /// gathered anew.
     ///
-    /// The same World, options and samples give the same bits on any number of threads. If nothing can be reused, these are the bits of
-    /// a bake without samples, unless [`BakeOptions::memory`] is limited: samples take up a part of it.
+    /// The same World, options and samples give the same bits on any number of threads. If nothing can be reused, these
+    /// are the bits of a bake without samples, unless [`BakeOptions::memory`] is limited: samples take up a part of it.
     ///
-    /// Objects are recognised by their name, mesh, material and transform. Since a bake replaces meshes by unwrapped ones, it records
-    /// the original beside each of them ([`UnwrappedFrom`](crate::UnwrappedFrom)), so that a World can be edited and baked repeatedly.
-    /// That record is not saved: all objects of a level that was saved and loaded again count as new.
+    /// Objects are recognised by their name, mesh, material and transform. Since a bake replaces meshes by unwrapped
+    /// ones, it records the original beside each of them ([`UnwrappedFrom`](crate::UnwrappedFrom)), so that a World can
+    /// be edited and baked repeatedly. That record is not saved: all objects of a level that was saved and loaded again
+    /// count as new.
     #[must_use]
     pub fn former(self, samples: impl Into<Option<&'a Samples>>) -> Self {
         Self { former: samples.into(), ..self }
@@ -116,14 +124,14 @@ impl<'a> Bake<'a> {
     /// Bakes the static objects of a World and gives them their lightmaps.
     ///
     /// # Errors
-    /// [`BakeError`], which names the option, node or stage. [`BakeError::Checkpoint`] if the checkpoint's file cannot be created, or is
-    /// not a checkpoint.
+    /// [`BakeError`], which names the option, node or stage. [`BakeError::Checkpoint`] if the checkpoint's file cannot
+    /// be created, or is not a checkpoint.
     pub fn run(self, world: &mut World) -> Result<BakeReport, BakeError> {
         self.on_world(world).map(|(report, _)| report)
     }
 
-    /// As [`Bake::run`], but also returns samples that the next bake can be given by [`Bake::former`]. They are `None` if there was
-    /// nothing to bake, or if [`BakeOptions::time`] ended the bake.
+    /// As [`Bake::run`], but also returns samples that the next bake can be given by [`Bake::former`]. They are `None`
+    /// if there was nothing to bake, or if [`BakeOptions::time`] ended the bake.
     ///
     /// # Errors
     /// As [`Bake::run`].
@@ -131,7 +139,8 @@ impl<'a> Bake<'a> {
         Self { keeps_samples: true, ..self }.on_world(world)
     }
 
-    /// Bakes plain data, without a World. With [`Bake::keep_samples`] the result also contains the samples for the next bake.
+    /// Bakes plain data, without a World. With [`Bake::keep_samples`] the result also contains the samples for the next
+    /// bake.
     ///
     /// # Errors
     /// As [`Bake::run`].
@@ -295,8 +304,8 @@ fn run(
     Ok(BakeOutput { objects, maps, volume, samples })
 }
 
-/// If more than this share of the time for direct light has passed before that stage computes any light, time is short for a scene of
-/// this size.
+/// If more than this share of the time for direct light has passed before that stage computes any light, time is short
+/// for a scene of this size.
 const SHORT_OF_TIME: f64 = 0.3;
 
 /// Reports why there is no light to bake.
@@ -307,7 +316,7 @@ fn nothing_to_bake(why: &str, report: &mut BakeReport) -> BakeOutput {
 }
 
 impl Request<'_> {
-    /// Hashes the scene, decides whether samples of a former bake can be used, and opens the checkpoint.
+    /// Hashes the scene, decides whether samples of a previous bake can be used, and opens the checkpoint.
     fn prepare_reuse(
         &self,
         input: &StaticScene,
@@ -327,7 +336,8 @@ impl Request<'_> {
         Ok(reuse)
     }
 
-    /// Bytes per covered texel for samples: those that this bake returns, and those of the previous bake if they are used.
+    /// Bytes per covered texel for samples: those that this bake returns, and those of the previous bake if they are
+    /// used.
     fn sample_bytes(&self, uses_former: bool) -> u64 {
         let returned = if self.keeps_samples { memory::SAMPLES_BYTES } else { 0 };
         returned + if uses_former { memory::FORMER_SAMPLES_BYTES } else { 0 }

@@ -1,6 +1,6 @@
-//! Computes long lists in chunks. Between chunks progress is reported, the bake can be cancelled or run out of time, and finished values
-//! are written to the checkpoint. A value depends on its index alone, so the result does not depend on where one chunk ends and the next
-//! begins. If the caller cancels during a chunk, its remaining values are skipped.
+//! Computes long lists in chunks. Between chunks progress is reported, the bake can be cancelled or run out of time,
+//! and finished values are written to the checkpoint. A value depends on its index alone, so the result does not depend
+//! on where one chunk ends and the next begins. If the caller cancels during a chunk, its remaining values are skipped.
 
 use std::time::Instant;
 

@@ -1,6 +1,6 @@
-//! Hashes of everything that a bake's result depends on. They show whether a scene has to be baked again and which of its objects have
-//! changed, and they keep a checkpoint from being resumed by another bake. What the result does not depend on is left out, such as cameras,
-//! specular reflection and the number of threads.
+//! Hashes of everything that a bake's result depends on. They show whether a scene has to be baked again and which of
+//! its objects have changed, and they keep a checkpoint from being resumed by another bake. What the result does not
+//! depend on is left out, such as cameras, specular reflection and the number of threads.
 //!
 //! Structures are destructured without `..`, so that whoever adds a field has to decide here whether the bake reads it.
 
@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, from_world};
 use crate::{BakeError, BakeOptions, Density};
 
-/// The version of the baker: that of the crate, and a hash of its sources and of the crates that influence a baked file.
+/// The version of the baker: that of the crate, and a hash of its sources and of the crates that influence a baked
+/// file.
 pub(crate) const BAKER: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("LUMBRE_BAKE_SOURCES"));
 
 /// A BLAKE3 hash of a bake's input, or of a part of it. It is displayed as 64 hexadecimal digits.
@@ -43,16 +44,17 @@ impl fmt::Display for ContentHash {
     }
 }
 
-/// Computes the hash of everything that a [`Bake`](crate::Bake) of this World with these options depends on, so that a level whose hash
-/// has not changed need not be baked again.
+/// Computes the hash of everything that a [`Bake`](crate::Bake) of this World with these options depends on, so that a
+/// level whose hash has not changed need not be baked again.
 ///
-/// It covers the baker's version, the options, static meshes with their transforms, the diffuse reflection, emission and opacity of
-/// their materials with the pixels of their textures, the baked lights, and the sky, all in the order in which they are baked. If probes
-/// are baked, it also covers the bounding box of moving objects, and which emissive meshes are lights in real time. Baking a World does not
-/// change its hash, since the original meshes are hashed, not the unwrapped ones.
+/// It covers the baker's version, the options, static meshes with their transforms, the diffuse reflection, emission
+/// and opacity of their materials with the pixels of their textures, the baked lights, and the sky, all in the order in
+/// which they are baked. If probes are baked, it also covers the bounding box of moving objects, and which emissive
+/// meshes are lights in real time. Baking a World does not change its hash, since the original meshes are hashed, not
+/// the unwrapped ones.
 ///
-/// Equal hashes mean bit-identical bakes, unless [`BakeOptions::time`] cuts a bake short: the time limit and the number of threads are not
-/// hashed. The World is not changed, except that global transforms are updated.
+/// Equal hashes mean bit-identical bakes, unless [`BakeOptions::time`] cuts a bake short: the time limit and the number
+/// of threads are not hashed. The World is not changed, except that global transforms are updated.
 ///
 /// # Errors
 /// The same [`BakeError`] as a bake, for an option out of range or an invalid mesh.
@@ -208,8 +210,8 @@ impl Images {
     }
 }
 
-/// Writes values into a hash such that different inputs give different bytes: every list is preceded by its length, every option by whether
-/// it is present, every enum by the number of its variant.
+/// Writes values into a hash such that different inputs give different bytes: every list is preceded by its length,
+/// every option by whether it is present, every enum by the number of its variant.
 struct Hasher(blake3::Hasher);
 
 impl Hasher {
@@ -270,7 +272,8 @@ impl Hasher {
         }
     }
 
-    /// A list of `count` items, each of one or more words. Words are collected into blocks, as BLAKE3 is fast only on long inputs.
+    /// A list of `count` items, each of one or more words. Words are collected into blocks, as BLAKE3 is fast only on
+    /// long inputs.
     fn words(&mut self, count: usize, words: impl Iterator<Item = [u8; 4]>) {
         self.number(count as u64);
         let mut block = Vec::with_capacity(1 << 14);
@@ -376,7 +379,8 @@ impl Hasher {
     }
 
     fn textures(&mut self, textures: &MaterialTextures, images: &mut Images) {
-        // The bake ignores normal and occlusion maps, as a lightmap holds the light on the geometric surface: docs/decisions.md says why.
+        // The bake ignores normal and occlusion maps, as a lightmap holds the light on the geometric surface:
+        // docs/decisions.md says why.
         let MaterialTextures { base_color, emissive, metallic_roughness, normal: _, occlusion: _ } = textures;
         for texture in [base_color, emissive] {
             self.option(texture.as_ref(), |hasher, texture| hasher.texture(texture, images));

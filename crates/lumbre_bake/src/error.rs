@@ -1,4 +1,5 @@
-//! The errors of a bake and of its checkpoint. After an error the World is as it was before the bake, except for updated global transforms.
+//! The errors of a bake and of its checkpoint. After an error the World is as it was before the bake, except for
+//! updated global transforms.
 
 /// Why a bake ended without a result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -86,8 +87,8 @@ pub enum BakeError {
         /// The limit.
         limit: usize,
     },
-    /// Even with the fewest patches and rays the bake would need more memory than [`BakeOptions::memory`](crate::BakeOptions::memory)
-    /// allows.
+    /// Even with the fewest patches and rays the bake would need more memory than
+    /// [`BakeOptions::memory`](crate::BakeOptions::memory) allows.
     #[error(
         "the bake would need {} at least, of which {} for {covered} texels, and may take {}; allow more memory, lower the density or the \
          map size, or use fewer triangles", mebibytes(*needed), mebibytes(*texels), mebibytes(*limit)
@@ -118,8 +119,8 @@ pub enum BakeError {
     },
 }
 
-/// Why a checkpoint's file cannot be used at all, so that the bake does not start. A checkpoint that is only damaged, or that belongs to
-/// another bake, is no error: it is replaced, and a warning says why.
+/// Why a checkpoint's file cannot be used at all, so that the bake does not start. A checkpoint that is only damaged,
+/// or that belongs to another bake, is no error: it is replaced, and a warning says why.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {

@@ -1,8 +1,8 @@
-//! Bakes radiosity into lightmaps. The input is a World, whose static objects are given lightmaps, or plain meshes, materials and
-//! lights, whose maps are returned.
+//! Bakes radiosity into lightmaps. The input is a World, whose static objects are given lightmaps, or plain meshes,
+//! materials and lights, whose maps are returned.
 //!
-//! The bake needs no GPU; loading scenes and saving lightmaps is `lumbre_scene`'s. Light bounces between patches, and a final gather
-//! brings it to the texels.
+//! The bake needs no GPU; loading scenes and saving lightmaps is `lumbre_scene`'s. Light bounces between patches, and a
+//! final gather brings it to the texels.
 //!
 //! ```text
 //!   World ─► scene ─► sources ─► coverage ─► direct_light ─► radiosity ──────► final_gather ──► finish ──► BakedScene ─► World
@@ -18,8 +18,9 @@
 //!
 //! Start at [`Bake`]: `bake.rs` calls the stages in order, and docs/baking.md follows one photon through these folders.
 //!
-//! Everything is computed in canonical units (relative to the scene's centre, scaled by a power of two), with one seed per texel and
-//! patch. The result is therefore bit-identical on any number of threads and, for an emissive scene, at any scale of 2^k.
+//! Everything is computed in canonical units (relative to the scene's centre, scaled by a power of two), with one seed
+//! per texel and patch. The result is therefore bit-identical on any number of threads and, for an emissive scene, at
+//! any scale of 2^k.
 //!
 //! ```
 //! use std::sync::Arc;

@@ -1,5 +1,6 @@
-//! Estimates the memory of a bake beforehand and keeps it within [`BakeOptions::memory`], by fewer patches and form factor rays where
-//! more would not fit. The estimate is an upper bound; the test `peak_memory` compares it with the measured peak.
+//! Estimates the memory of a bake beforehand and keeps it within [`BakeOptions::memory`], by fewer patches and form
+//! factor rays where more would not fit. The estimate is an upper bound; the test `peak_memory` compares it with the
+//! measured peak.
 
 use std::mem::size_of;
 
@@ -16,15 +17,16 @@ use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::sources::direct::Direct;
 use crate::{BakeError, BakeOptions, BakeReport};
 
-/// Per triangle of the scene: the triangle itself; while the hierarchy is built, its corners without and with an index, and two nodes of the
-/// binary tree; in the finished hierarchy, its lane of a block that may be half empty, and its share of the nodes of eight (256 bytes
-/// each, at worst one per four triangles); in the tree of boxes, its number and at worst one node.
+/// Per triangle of the scene: the triangle itself; while the hierarchy is built, its corners without and with an index,
+/// and two nodes of the binary tree; in the finished hierarchy, its lane of a block that may be half empty, and its
+/// share of the nodes of eight (256 bytes each, at worst one per four triangles); in the tree of boxes, its number and
+/// at worst one node.
 const TRIANGLE_BYTES: u64 =
     (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32) as u64;
 
-/// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a round, raw and
-/// smoothed estimates with their guides, sixteen lists of one number each for the errors, the light around it, and its block. (The sums of
-/// the shared samples of direct light need less, and are freed by then.)
+/// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
+/// round, raw and smoothed estimates with their guides, sixteen lists of one number each for the errors, the light
+/// around it, and its block. (The sums of the shared samples of direct light need less, and are freed by then.)
 const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + size_of::<Direct>()
     + 2 * size_of::<GatherSums>()
@@ -33,9 +35,10 @@ const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + 16 * 4
     + 3 * 4) as u64;
 
-/// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later: estimates with their bias,
-/// the numbers of the weighted fit, guides with the noise, products, and nearness. Besides, its place among the covered texels and its
-/// surface, and for rays that hit it, its reflectance and the light of the previous round with its error.
+/// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later:
+/// estimates with their bias, the numbers of the weighted fit, guides with the noise, products, and nearness. Besides,
+/// its place among the covered texels and its surface, and for rays that hit it, its reflectance and the light of the
+/// previous round with its error.
 const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + 4 * (3 + 3 + 1 + 2);
 
 /// Per texel of a map, for separate maps of direct and bounced light: both as computed, as filled, and as divided.
@@ -52,27 +55,28 @@ fn margin_texels(layout: &LightmapLayout) -> u64 {
     layout.maps.iter().map(|map| u64::from(map.height) * BESIDE_A_ROW as u64).sum()
 }
 
-/// Per patch: the patch itself, its direct light in two halves and their mean, the heads of its matrix rows, sixteen lists of the solver for
-/// each channel, and the distance below which it is too coarse to read.
+/// Per patch: the patch itself, its direct light in two halves and their mean, the heads of its matrix rows, sixteen
+/// lists of the solver for each channel, and the distance below which it is too coarse to read.
 const PATCH_BYTES: u64 = (size_of::<Patch>() + 4 * 12 + 6 * 24 + 3 * 16 * 8 + 4) as u64;
 
-/// Per form factor ray, at worst, when each hits a different patch: its count in its half of the rays (a list may have grown to twice
-/// its length), in the row and in the column, and both entries of the pair in the matrix and in that of the half.
+/// Per form factor ray, at worst, when each hits a different patch: its count in its half of the rays (a list may have
+/// grown to twice its length), in the row and in the column, and both entries of the pair in the matrix and in that of
+/// the half.
 const FORM_FACTOR_RAY_BYTES: u64 = 2 * 8 + 8 + 2 * 8 + 2 * 8 + 8;
 
-/// Per patch, for the sampling guide: the number of its region, its place in the region's list, its exitance, and at worst a region of its
-/// own, with its cut, the heads of its list and row, its brightness and its exchange.
+/// Per patch, for the sampling guide: the number of its region, its place in the region's list, its exitance, and at
+/// worst a region of its own, with its cut, the heads of its list and row, its brightness and its exchange.
 const GUIDED_PATCH_BYTES: u64 = (4 + 8 + 4 + size_of::<Patch>() + 16 + 24 + 16 + 8 + 8) as u64;
 
-/// Per form factor ray, for the sampling guide: two pairs of regions, each an index and a probability, in lists that may have grown to twice
-/// their length.
+/// Per form factor ray, for the sampling guide: two pairs of regions, each an index and a probability, in lists that
+/// may have grown to twice their length.
 const GUIDE_PAIR_BYTES: u64 = 2 * 2 * (4 + 4);
 
 /// Per covered texel, for the samples that the bake returns.
 pub(crate) const SAMPLES_BYTES: u64 = size_of::<TexelSamples>() as u64;
 
-/// Per covered texel, for the samples of a previous bake: the samples themselves, the sums and direct light reused from them, the change of
-/// its light, and its light and direct light in the previous bake.
+/// Per covered texel, for the samples of a previous bake: the samples themselves, the sums and direct light reused from
+/// them, the change of its light, and its light and direct light in the previous bake.
 pub(crate) const FORMER_SAMPLES_BYTES: u64 =
     (size_of::<TexelSamples>() + size_of::<GatherSums>() + size_of::<Option<Direct>>() + 8 + 4 + 4 + 4 * 12)
         as u64;
@@ -80,8 +84,8 @@ pub(crate) const FORMER_SAMPLES_BYTES: u64 =
 /// Memory that is not counted above: threads, buffers, the checkpoint's block.
 const OTHER_BYTES: u64 = 32 << 20;
 
-/// Checks, before the covered texels are listed, whether they can fit at all. `sample_bytes` are the bytes per covered texel for samples of
-/// this bake and a previous one.
+/// Checks, before the covered texels are listed, whether they can fit at all. `sample_bytes` are the bytes per covered
+/// texel for samples of this bake and a previous one.
 ///
 /// # Errors
 /// [`BakeError::Memory`].
@@ -102,8 +106,8 @@ pub(crate) fn check_texels(
     Ok(())
 }
 
-/// Chooses the resolution of the patches and form factors: that of the quality, or the finest that fits into memory. Writes the estimated
-/// memory into the report, and a warning if the resolution was reduced.
+/// Chooses the resolution of the patches and form factors: that of the quality, or the finest that fits into memory.
+/// Writes the estimated memory into the report, and a warning if the resolution was reduced.
 ///
 /// # Errors
 /// [`BakeError::Memory`] if even the coarsest resolution does not fit.

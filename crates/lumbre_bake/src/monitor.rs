@@ -1,5 +1,5 @@
-//! Supervises a running bake: reports progress to the caller, measures stages, keeps the time limit, handles cancellation, and passes
-//! finished chunks to the checkpoint. How a list is divided into chunks is in `chunks`.
+//! Supervises a running bake: reports progress to the caller, measures stages, keeps the time limit, handles
+//! cancellation, and passes finished chunks to the checkpoint. How a list is divided into chunks is in `chunks`.
 
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -49,7 +49,8 @@ struct StageShare {
     name: &'static str,
     /// Its usual share of the bake's time.
     of_time: f32,
-    /// The share of the time limit after which this stage takes no more samples, so that time is left for a rough result of later stages.
+    /// The share of the time limit after which this stage takes no more samples, so that time is left for a rough
+    /// result of later stages.
     of_limit: f64,
 }
 
@@ -104,8 +105,8 @@ impl Clock {
         Self { limit: self.limit.map(|limit| limit.mul_f64(share)), ..*self }
     }
 
-    /// The total number of samples, at most `wanted`, for which there is time, given that the `taken` ones so far took `seconds`. Without a
-    /// time limit, all of them.
+    /// The total number of samples, at most `wanted`, for which there is time, given that the `taken` ones so far took
+    /// `seconds`. Without a time limit, all of them.
     pub fn affordable(&self, taken: u32, wanted: u32, seconds: f64) -> u32 {
         let Some(limit) = self.limit else { return wanted };
         let left = (limit.as_secs_f64() - self.seconds()).max(0.0);
@@ -199,7 +200,8 @@ impl<'a> BakeMonitor<'a> {
         self.advance(0.0)
     }
 
-    /// Begins one of several passes of the running stage: it makes up `share`, in [0, 1], of the rest of the stage's progress.
+    /// Begins one of several passes of the running stage: it makes up `share`, in [0, 1], of the rest of the stage's
+    /// progress.
     pub fn pass(&mut self, share: f32) {
         let begin = if self.pass.1 < 1.0 { self.pass.1 } else { 0.0 };
         self.pass = (begin, begin + (1.0 - begin) * share);
@@ -227,9 +229,9 @@ impl<'a> BakeMonitor<'a> {
         self.check_cancelled()
     }
 
-    /// Runs `work` on this thread while another thread calls the progress callback regularly. If that cancels the bake, [`BakeMonitor::stop`]
-    /// is set, which `work` should poll, and its result is discarded. `stage_fraction` is the progress of the running stage, or of its pass,
-    /// at the beginning of `work`.
+    /// Runs `work` on this thread while another thread calls the progress callback regularly. If that cancels the bake,
+    /// [`BakeMonitor::stop`] is set, which `work` should poll, and its result is discarded. `stage_fraction` is the
+    /// progress of the running stage, or of its pass, at the beginning of `work`.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
@@ -260,8 +262,8 @@ impl<'a> BakeMonitor<'a> {
         Ok(result)
     }
 
-    /// As [`BakeMonitor::run_interruptible`], but for work that does not poll [`BakeMonitor::stop`]. It runs on a thread of its own, which is
-    /// left to finish by itself if the bake is cancelled.
+    /// As [`BakeMonitor::run_interruptible`], but for work that does not poll [`BakeMonitor::stop`]. It runs on a
+    /// thread of its own, which is left to finish by itself if the bake is cancelled.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
@@ -271,7 +273,8 @@ impl<'a> BakeMonitor<'a> {
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, BakeError> {
         let (sender, receiver) = std::sync::mpsc::sync_channel(1);
-        // Shared with the thread instead of moved into it, so that the work can still be run here if the thread cannot be started.
+        // Shared with the thread instead of moved into it, so that the work can still be run here if the thread cannot
+        // be started.
         let work = std::sync::Arc::new(Mutex::new(Some(work)));
         let work_of_thread = std::sync::Arc::clone(&work);
         let take = |from: &Mutex<Option<_>>| from.lock().unwrap_or_else(PoisonError::into_inner).take();
@@ -332,8 +335,8 @@ impl<'a> BakeMonitor<'a> {
         ChunkKey { stage: self.running() as u8, of, start }
     }
 
-    /// The values of a list of `of` from `start` on, if the checkpoint has them. An empty list means that the interrupted bake had no time
-    /// left for the rest.
+    /// The values of a list of `of` from `start` on, if the checkpoint has them. An empty list means that the
+    /// interrupted bake had no time left for the rest.
     pub fn load_chunk<T: Record>(&mut self, start: usize, of: usize) -> Option<Vec<T>> {
         let (values, seconds) = self.checkpoint.next(self.chunk_key(start, of))?;
         self.clock = Clock { begun: Instant::now(), resumed_seconds: seconds, ..self.clock };

@@ -9,8 +9,8 @@ use crate::BakeError;
 /// How densely surfaces are covered with lightmap texels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Density {
-    /// About 500,000 texels for the whole scene, whatever its size, distributed in proportion to surface area times the square of each
-    /// object's lightmap scale.
+    /// About 500,000 texels for the whole scene, whatever its size, distributed in proportion to surface area times the
+    /// square of each object's lightmap scale.
     #[default]
     Automatic,
     /// Texels per metre of surface, multiplied by each object's lightmap scale; positive and finite.
@@ -40,7 +40,8 @@ pub enum Quality {
     /// For shipping.
     #[default]
     Final,
-    /// Ground truth for evaluating the other qualities: far more patches and rays than a game needs. Takes minutes, not seconds.
+    /// Ground truth for evaluating the other qualities: far more patches and rays than a game needs. Takes minutes, not
+    /// seconds.
     Reference,
 }
 
@@ -50,19 +51,22 @@ pub enum FormFactorMethod {
     /// Cosine-distributed rays from points on every patch: F_ij is the fraction of patch i's rays that hit j first.
     #[default]
     CosineRays,
-    /// Lines distributed uniformly through the whole scene (Sbert, "An integral geometry based method for fast form-factor computation",
-    /// 1993). Two surfaces that are neighbours on a line and face each other exchange light along it in both directions.
+    /// Lines distributed uniformly through the whole scene (Sbert, "An integral geometry based method for fast
+    /// form-factor computation", 1993). Two surfaces that are neighbours on a line and face each other exchange light
+    /// along it in both directions.
     GlobalLines,
 }
 
-/// The iterative method that solves the radiosity system. All reach the same solution, in different numbers of iterations.
+/// The iterative method that solves the radiosity system. All reach the same solution, in different numbers of
+/// iterations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Solver {
     /// B ← E + ρ F B: each iteration adds one bounce.
     Jacobi,
     /// As Jacobi, but each patch reads the values already updated in the same sweep.
     GaussSeidel,
-    /// Conjugate gradients on the symmetric positive definite form [diag(A_i/ρ_i) - G] B = A_i E_i/ρ_i, preconditioned with its diagonal.
+    /// Conjugate gradients on the symmetric positive definite form [diag(A_i/ρ_i) - G] B = A_i E_i/ρ_i, preconditioned
+    /// with its diagonal.
     #[default]
     ConjugateGradients,
 }
@@ -72,27 +76,30 @@ pub enum Solver {
 pub struct BakeOptions {
     /// How densely surfaces are covered with texels.
     pub density: Density,
-    /// The target: the relative RMSE that sampling may leave in the lightmap; positive. 0.01 is one per cent of the light around each
-    /// texel. The final gather stops when its estimate reaches this, or at the quality's limit of rays.
+    /// The target: the relative RMSE that sampling may leave in the lightmap; positive. 0.01 is one per cent of the
+    /// light around each texel. The final gather stops when its estimate reaches this, or at the quality's limit of
+    /// rays.
     pub error: f64,
-    /// Wall-clock time after which no more samples are taken; `None` for no limit. The map is complete all the same, only noisier. Its
-    /// bits then depend on the machine's speed.
+    /// Wall-clock time after which no more samples are taken; `None` for no limit. The map is complete all the same,
+    /// only noisier. Its bits then depend on the machine's speed.
     pub time: Option<Duration>,
     /// The effort that the bake may spend.
     pub quality: Quality,
-    /// Side of a patch in texels, in [1, 64]; `None` for the quality's default. Smaller patches exchange light in more detail, of which
-    /// only the bounces after the first benefit, and need more rays. Patches are larger than this where there would be more of them
-    /// than the quality allows.
+    /// Side of a patch in texels, in [1, 64]; `None` for the quality's default. Smaller patches exchange light in more
+    /// detail, of which only the bounces after the first benefit, and need more rays. Patches are larger than this
+    /// where there would be more of them than the quality allows.
     pub patch_texels: Option<f32>,
-    /// Empty texels between charts, which are filled with the values beside them so that filtering at a chart's border reads no black: 2
-    /// for bilinear filtering, 4 for bicubic.
+    /// Empty texels between charts, which are filled with the values beside them so that filtering at a chart's border
+    /// reads no black: 2 for bilinear filtering, 4 for bicubic.
     pub gap: u32,
-    /// Largest side of an atlas in texels, in [16, 8192]. With it, the maps of several objects are packed into shared atlases, and objects
-    /// that share a mesh get copies of it with coordinates for their places in the atlas. With `None`, each object has its own map.
+    /// Largest side of an atlas in texels, in [16, 8192]. With it, the maps of several objects are packed into shared
+    /// atlases, and objects that share a mesh get copies of it with coordinates for their places in the atlas. With
+    /// `None`, each object has its own map.
     pub atlas_size: Option<u32>,
     /// Seed of all random numbers. The same seed gives the same bits on any number of threads.
     pub seed: u32,
-    /// Number of worker threads, in [1, 1024]; `None` for those of Rayon's current pool, by default one per logical processor.
+    /// Number of worker threads, in [1, 1024]; `None` for those of Rayon's current pool, by default one per logical
+    /// processor.
     pub threads: Option<usize>,
     /// How form factors are estimated.
     pub form_factors: FormFactorMethod,
@@ -102,17 +109,18 @@ pub struct BakeOptions {
     pub denoise: bool,
     /// Closes seams: where charts meet on a smooth surface, both sides are made to show the same light.
     pub seams: bool,
-    /// Estimates the error that is due to the map's resolution, from points that are baked separately. Takes about a twentieth of the
-    /// rays.
+    /// Estimates the error that is due to the map's resolution, from points that are baked separately. Takes about a
+    /// twentieth of the rays.
     pub resolution_error: bool,
     /// Whether irradiance probes are baked.
     pub probes: Probes,
-    /// Largest distance between probes in metres, positive and finite. `None` chooses it by the scene's size, for up to 4096 probes.
+    /// Largest distance between probes in metres, positive and finite. `None` chooses it by the scene's size, for up to
+    /// 4096 probes.
     pub probe_spacing: Option<f64>,
     /// Additionally outputs direct and bounced light as separate maps. The combined maps stay the same.
     pub separate_light: bool,
-    /// Most memory in bytes that the bake may use beside the World; `None` for no limit. Where the quality's patches and rays do not fit,
-    /// fewer are used.
+    /// Most memory in bytes that the bake may use beside the World; `None` for no limit. Where the quality's patches
+    /// and rays do not fit, fewer are used.
     pub memory: Option<u64>,
 }
 
@@ -156,13 +164,14 @@ pub(crate) struct Effort {
     pub shared: [u32; 2],
     /// Gather rays per texel: in the first round, and at most.
     pub gather: [u32; 2],
-    /// Limit for a bake's total, whatever error was requested: most gather rays, and most samples of the sources that share them, per texel
-    /// on average. The total may always be as large as [`SMALL_BUDGET`].
+    /// Limit for a bake's total, whatever error was requested: most gather rays, and most samples of the sources that
+    /// share them, per texel on average. The total may always be as large as [`SMALL_BUDGET`].
     pub mean: u32,
 }
 
-/// Requested errors from this on start with half of the quality's gather rays, and with fewer patches. At smaller errors that does not pay:
-/// from so few rays the smoothing cannot tell edges from noise, and the additional rounds cost more than was saved.
+/// Requested errors from this on start with half of the quality's gather rays, and with fewer patches. At smaller
+/// errors that does not pay: from so few rays the smoothing cannot tell edges from noise, and the additional rounds
+/// cost more than was saved.
 const COARSE_ERROR: f64 = 0.04;
 
 impl Quality {
@@ -210,8 +219,8 @@ impl Effort {
 const SMALL_BUDGET: u64 = 32_000_000;
 
 impl BakeOptions {
-    /// The quality's effort, reduced if a large error was requested: the rays that are cast before the error can be estimated should not
-    /// cost more than that error needs.
+    /// The quality's effort, reduced if a large error was requested: the rays that are cast before the error can be
+    /// estimated should not cost more than that error needs.
     pub(crate) fn effort(&self) -> Effort {
         let mut effort = self.quality.effort();
         effort.patch_texels = self.patch_texels.unwrap_or(effort.patch_texels);
@@ -227,7 +236,8 @@ impl BakeOptions {
         effort
     }
 
-    /// Options for the patches and their form factors: coarser ones if time is short, so that most of it is left for the final gather.
+    /// Options for the patches and their form factors: coarser ones if time is short, so that most of it is left for
+    /// the final gather.
     pub(crate) fn for_patches(&self, is_time_short: bool) -> Self {
         Self { error: if is_time_short { self.error.max(COARSE_ERROR) } else { self.error }, ..*self }
     }

@@ -1,5 +1,6 @@
-//! Prepares a bake before any light is computed: the lightmap layout, the scene with its hierarchies, and the light sources. Layout and
-//! scene have steps that cannot be interrupted, so they run on a detached thread. The work itself is in `scene` and `sources`.
+//! Prepares a bake before any light is computed: the lightmap layout, the scene with its hierarchies, and the light
+//! sources. Layout and scene have steps that cannot be interrupted, so they run on a detached thread. The work itself
+//! is in `scene` and `sources`.
 
 use std::sync::Arc;
 
@@ -30,8 +31,8 @@ pub(crate) fn layout(
     layout
 }
 
-/// Builds the scene with its hierarchies, and finds the triangles that emit light. Also returns `layout`, which the detached thread takes
-/// by value.
+/// Builds the scene with its hierarchies, and finds the triangles that emit light. Also returns `layout`, which the
+/// detached thread takes by value.
 ///
 /// # Errors
 /// [`BakeError`] of the scene, or [`BakeError::Cancelled`].
@@ -56,8 +57,8 @@ pub(crate) fn scene(
     Ok((scene, layout, emitters))
 }
 
-/// Collects the light sources. The report lists the kinds of sources that the scene does not have, and warns of emissive textures with
-/// finer detail than is sampled.
+/// Collects the light sources. The report lists the kinds of sources that the scene does not have, and warns of
+/// emissive textures with finer detail than is sampled.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].

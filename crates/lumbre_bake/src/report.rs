@@ -1,5 +1,5 @@
-//! The report of a bake: what it did, how long it took, and the estimated errors. Includes its text output, but not the estimation of errors,
-//! which is in `final_gather` and `finish`.
+//! The report of a bake: what it did, how long it took, and the estimated errors. Includes its text output, but not the
+//! estimation of errors, which is in `final_gather` and `finish`.
 
 use serde::{Deserialize, Serialize};
 
@@ -48,8 +48,8 @@ pub struct ProbeReport {
     pub estimated_error: f64,
 }
 
-/// The error that is due to the map's resolution: how far a bilinear look-up differs from the irradiance at points of the surfaces, apart
-/// from sampling errors. All zeros if it was not measured.
+/// The error that is due to the map's resolution: how far a bilinear look-up differs from the irradiance at points of
+/// the surfaces, apart from sampling errors. All zeros if it was not measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ResolutionReport {
@@ -87,7 +87,8 @@ impl std::fmt::Display for WorstPlace {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SeamReport {
-    /// Number of seams: pairs of edges that coincide in space and join smoothly, but have different lightmap coordinates.
+    /// Number of seams: pairs of edges that coincide in space and join smoothly, but have different lightmap
+    /// coordinates.
     pub edges: usize,
     /// RMS difference between the two sides of the seams before they were closed.
     pub jump_before: f64,
@@ -113,7 +114,8 @@ pub struct RebakeReport {
     pub relit: usize,
     /// How many of them had their bounced light gathered anew.
     pub gathered: usize,
-    /// RMSE due to the neglected changes of the reused light, relative to the mean irradiance. It is part of the stated error.
+    /// RMSE due to the neglected changes of the reused light, relative to the mean irradiance. It is part of the stated
+    /// error.
     pub neglected: f64,
 }
 
@@ -218,28 +220,30 @@ pub struct BakeReport {
     pub texels: usize,
     /// Fraction of the texels that are covered by a surface, in [0, 1].
     pub coverage: f64,
-    /// Number of texels that lie wholly or partly inside other geometry. The hidden part does not contribute to their value.
+    /// Number of texels that lie wholly or partly inside other geometry. The hidden part does not contribute to their
+    /// value.
     pub hidden_texels: usize,
-    /// Rays of the final gather that ended on the black back of a one-sided surface or inside a closed solid, or that left a scene whose
-    /// rooms are closed on all sides. They bring no light.
+    /// Rays of the final gather that ended on the black back of a one-sided surface or inside a closed solid, or that
+    /// left a scene whose rooms are closed on all sides. They bring no light.
     pub leaked_rays: u64,
     /// Gather rays per covered texel, on average.
     pub gather_rays: f64,
     /// Mean irradiance over the texels that show a surface, W/m², linear RGB.
     pub mean_irradiance: [f64; 3],
-    /// Estimated RMSE that sampling leaves in the lightmap. The error of each texel is taken relative to the light around it, as a viewer
-    /// whose eyes have adapted to that room would see it.
+    /// Estimated RMSE that sampling leaves in the lightmap. The error of each texel is taken relative to the light
+    /// around it, as a viewer whose eyes have adapted to that room would see it.
     pub estimated_error: f64,
     /// The same errors, relative to the mean irradiance of the whole level.
     pub error_of_mean: f64,
     /// The sources of `estimated_error`, the largest first.
     #[serde(default)]
     pub error_parts: Vec<ErrorPart>,
-    /// Where the estimated error is largest: at most three places about the size of a room (an eighth of the level's longest side), each with
-    /// at least a hundredth of all texels, the worst first. Empty if no place is worse than the whole.
+    /// Where the estimated error is largest: at most three places about the size of a room (an eighth of the level's
+    /// longest side), each with at least a hundredth of all texels, the worst first. Empty if no place is worse than
+    /// the whole.
     pub worst: Vec<WorstPlace>,
-    /// The estimated error over time: after each round of the final gather (or after direct light, if nothing bounces), and at the end. Empty
-    /// if there was nothing to bake.
+    /// The estimated error over time: after each round of the final gather (or after direct light, if nothing bounces),
+    /// and at the end. Empty if there was nothing to bake.
     pub curve: Vec<ErrorAtTime>,
     /// Whether the estimated error is at most [`BakeOptions::error`](crate::BakeOptions::error).
     pub error_reached: bool,

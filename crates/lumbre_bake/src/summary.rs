@@ -1,5 +1,5 @@
-//! Writes the figures of the whole bake into its report: mean irradiance, error, worst places and times. How errors are estimated is in
-//! `final_gather`.
+//! Writes the figures of the whole bake into its report: mean irradiance, error, worst places and times. How errors are
+//! estimated is in `final_gather`.
 
 use glam::{DVec3, Vec3};
 
@@ -37,7 +37,8 @@ pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> B
     report
 }
 
-/// Writes what is known once every texel has its light: the mean irradiance, the worst places and, if nothing bounces, the error.
+/// Writes what is known once every texel has its light: the mean irradiance, the worst places and, if nothing bounces,
+/// the error.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].

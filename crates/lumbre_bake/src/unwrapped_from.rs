@@ -1,5 +1,5 @@
-//! Remembers the mesh from which a bake made an unwrapped one. The next bake of the same World reads that original, and so recognises
-//! objects that have not changed. The unwrap itself is in `scene`.
+//! Remembers the mesh from which a bake made an unwrapped one. The next bake of the same World reads that original, and
+//! so recognises objects that have not changed. The unwrap itself is in `scene`.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use bevy_ecs::prelude::Component;
 use lumbre_mesh::TriangleMesh;
 use lumbre_scene::{MaterialTextures, Mesh};
 
-/// Component that records from which mesh and textures a bake made the entity's unwrapped [`Mesh`]. It is ignored once the entity has
-/// been given another mesh.
+/// Component that records from which mesh and textures a bake made the entity's unwrapped [`Mesh`]. It is ignored once
+/// the entity has been given another mesh.
 #[derive(Component, Clone, Debug)]
 pub struct UnwrappedFrom {
     source: (Arc<TriangleMesh>, Option<MaterialTextures>),
@@ -28,8 +28,8 @@ impl UnwrappedFrom {
         &self.source.0
     }
 
-    /// The mesh and textures that a bake has to read for an entity: the originals if the entity still has the unwrapped mesh, otherwise its
-    /// current ones.
+    /// The mesh and textures that a bake has to read for an entity: the originals if the entity still has the unwrapped
+    /// mesh, otherwise its current ones.
     pub(crate) fn read(
         unwrapped: Option<&Self>,
         mesh: &Mesh,
@@ -40,7 +40,8 @@ impl UnwrappedFrom {
         let Some(unwrapped) = unwrapped else { return current() };
         let bake_changed_textures = unwrapped.source.1 != unwrapped.made.1;
         match (bake_changed_textures, unwrapped.made.1.as_ref() == textures) {
-            // The bake has not redirected textures to other coordinates, so they fit the original mesh even if they were replaced since.
+            // The bake has not redirected textures to other coordinates, so they fit the original mesh even if they
+            // were replaced since.
             (false, _) => (Arc::clone(&unwrapped.source.0), textures.cloned()),
             (true, true) => unwrapped.source.clone(),
             // These textures were chosen for the coordinates of the unwrapped mesh.

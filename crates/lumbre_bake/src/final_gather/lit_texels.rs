@@ -1,4 +1,5 @@
-//! The covered texels with all their light, for the stages after the gather. Finished maps are made from it in `finish`.
+//! The covered texels with all their light, for the stages after the gather. Finished maps are made from it in
+//! `finish`.
 
 use glam::Vec3;
 

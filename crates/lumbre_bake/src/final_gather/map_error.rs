@@ -17,7 +17,8 @@ pub(crate) struct MapError {
 }
 
 impl MapError {
-    /// Sums up `errors`, the ledger's total per texel. `mean` is the map's mean irradiance in W/m², mean of the channels.
+    /// Sums up `errors`, the ledger's total per texel. `mean` is the map's mean irradiance in W/m², mean of the
+    /// channels.
     pub fn new(
         ledger: &ErrorLedger<'_>,
         errors: &SquaredErrors,
