@@ -1,4 +1,5 @@
-//! The bake from end to end: a static scene in, its light out, through the stages. Not the stages themselves.
+//! [`Bake`], the entry point of the crate, and `run`, which calls the stages in order. The stages themselves are in the
+//! folders beside.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -26,16 +27,21 @@ use crate::radiosity::patches::Patches;
 use crate::rebake::{Reuse, Samples, rebake_report, reused_gather};
 use crate::scene::{StaticScene, from_world};
 use crate::summary;
-use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, Progress, preparing};
+use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, Progress, prepare};
 
-/// A bake that is about to run: the light of a world's static objects, in lightmaps.
+/// Configures and runs a bake, which computes the light on the static objects of a scene and stores it in lightmaps.
 ///
-/// Reads every `Mesh` with a `SceneObject` (dynamic and hidden ones are left out), emissive materials, and lights whose
-/// `BakeMode` is `Static` (direct light and bounces) or `Mixed` (bounces only). Afterwards each of those entities has
-/// its mesh with `uv1` and a `Lightmap` of E/π; the primitives of a glTF node share one map. If anything fails or is
-/// cancelled the world's meshes and lightmaps are as they were (only global transforms are brought up to date).
+/// [`Bake::run`] bakes the entities of a World that have a `Mesh` and a `StaticObject`, except hidden ones and those
+/// that are or are below a `DynamicObject`. Light comes from emissive materials, from the sky, and from lights whose
+/// `BakeMode` is `Static` (direct light and bounces are baked) or `Mixed` (only the bounces are). After the bake each
+/// of these entities has a mesh with lightmap coordinates in `uv1`, and a `Lightmap` of E/π. The primitives of a glTF
+/// node share one map.
 ///
-/// The same world, options and seed give the same bits on any number of threads, unless [`BakeOptions::time`] cuts it short.
+/// If the bake fails or is cancelled, the World's meshes and lightmaps are unchanged; only global transforms have been
+/// updated.
+///
+/// The same World and options give the same bits on any number of threads, unless [`BakeOptions::time`] cuts the bake
+/// short.
 ///
 /// ```
 /// # use bevy_ecs::world::World;
@@ -62,7 +68,7 @@ pub struct Bake<'a> {
 }
 
 impl<'a> Bake<'a> {
-    /// With these options, and nothing else.
+    /// A bake with these options, without a progress callback, a checkpoint or samples of a previous bake.
     pub fn new(options: &BakeOptions) -> Self {
         Self {
             options: *options,
@@ -74,49 +80,58 @@ impl<'a> Bake<'a> {
         }
     }
 
-    /// Calls back between chunks of work, and some twenty times a second while one takes long; `ControlFlow::Break` cancels the bake.
+    /// Sets a callback that is called between chunks of work, and about twenty times a second during a long one. If it
+    /// returns `ControlFlow::Break`, the bake is cancelled.
     #[must_use]
     pub fn progress(self, progress: impl FnMut(Progress) -> ControlFlow<()> + Send + 'a) -> Self {
         Self { progress: Box::new(progress), ..self }
     }
 
-    /// Ends when the token is cancelled, from whatever thread. (A callback that breaks cancels it, too.)
+    /// Sets a token by which any thread can cancel the bake. A progress callback that returns `ControlFlow::Break`
+    /// cancels it, too.
     #[must_use]
     pub fn cancel(self, token: &CancelToken) -> Self {
         Self { cancel: token.clone(), ..self }
     }
 
-    /// Keeps what has been computed in a checkpoint, or goes on from one: an interrupted bake that is resumed gives the same bits as one that was not
-    /// interrupted. What is wrong with a checkpoint that is there and not used stands in the report's warnings.
+    /// Saves intermediate results in a checkpoint, or resumes from one. A bake that was interrupted and resumed gives
+    /// the same bits as one that was not. If a checkpoint exists but cannot be resumed, the report's warnings say why.
     #[must_use]
     pub fn checkpoint(self, checkpoint: impl Into<Option<&'a Checkpoint>>) -> Self {
         Self { checkpoint: checkpoint.into(), ..self }
     }
 
-    /// Keeps of a former bake what the scene's changes can hardly have affected. The report's [`rebake`](BakeReport::rebake) says what was kept, or why
-    /// nothing was: then the whole scene is baked. What the light of the kept texels may have changed by is part of the stated error, adds up over
-    /// several bakes, and is gathered anew when it is no longer small beside the error asked for.
+    /// Passes the samples of a previous bake, so that texels whose light the scene's changes hardly affect are not
+    /// computed again. The report's [`rebake`](BakeReport::rebake) says what was reused, or why the whole scene had to
+    /// be baked.
     ///
-    /// The same world, options, seed and former samples give the same bits on any number of threads; those of a whole bake where there is nothing to
-    /// keep, unless [`BakeOptions::memory`] is short: samples take some of it.
+    /// The light of a reused texel may be off by the change that was neglected. This is part of the stated error and
+    /// adds up over successive bakes; once it is no longer small compared with the requested error, the texel is
+    /// gathered anew.
     ///
-    /// Objects are recognised by name, mesh, material and place as they were before a bake, which gives meshes new coordinates:
-    /// [`UnwrappedFrom`](crate::UnwrappedFrom) remembers beside such a mesh what it was. A World can so be changed and baked again and again; a level that
-    /// was saved and loaded again counts as new.
+    /// The same World, options and samples give the same bits on any number of threads. If nothing can be reused, these
+    /// are the bits of a bake without samples, unless [`BakeOptions::memory`] is limited: samples take up a part of it.
+    ///
+    /// Objects are recognised by their name, mesh, material and transform. Since a bake replaces meshes by unwrapped
+    /// ones, it records the original beside each of them ([`UnwrappedFrom`](crate::UnwrappedFrom)), so that a World can
+    /// be edited and baked repeatedly. That record is not saved: all objects of a level that was saved and loaded again
+    /// count as new.
     #[must_use]
     pub fn former(self, samples: impl Into<Option<&'a Samples>>) -> Self {
         Self { former: samples.into(), ..self }
     }
 
-    /// Bakes a World's static scene, and gives its objects their maps.
+    /// Bakes the static objects of a World and gives them their lightmaps.
     ///
     /// # Errors
-    /// [`BakeError`], which names the option, node or stage; [`BakeError::Checkpoint`] if the checkpoint's file cannot be begun, or is something else.
+    /// [`BakeError`], which names the option, node or stage. [`BakeError::Checkpoint`] if the checkpoint's file cannot
+    /// be created, or is not a checkpoint.
     pub fn run(self, world: &mut World) -> Result<BakeReport, BakeError> {
         self.on_world(world).map(|(report, _)| report)
     }
 
-    /// As [`Bake::run`], and returns the samples for [`Bake::former`] of the next time: none where there was nothing to bake, or no time for it.
+    /// As [`Bake::run`], but also returns samples that the next bake can be given by [`Bake::former`]. They are `None`
+    /// if there was nothing to bake, or if [`BakeOptions::time`] ended the bake.
     ///
     /// # Errors
     /// As [`Bake::run`].
@@ -124,7 +139,8 @@ impl<'a> Bake<'a> {
         Self { keeps_samples: true, ..self }.on_world(world)
     }
 
-    /// Bakes plain data, without a World. With [`Bake::keep_samples`] the samples for the next time come with the maps.
+    /// Bakes plain data, without a World. With [`Bake::keep_samples`] the result also contains the samples for the next
+    /// bake.
     ///
     /// # Errors
     /// As [`Bake::run`].
@@ -151,7 +167,7 @@ impl<'a> Bake<'a> {
         self.on_threads(&Arc::new(scene.checked()?))
     }
 
-    /// Keeps samples for [`Bake::former`] of the next time.
+    /// Makes [`Bake::run_scene`] return samples that the next bake can be given by [`Bake::former`].
     #[must_use]
     pub fn keep_samples(self) -> Self {
         Self { keeps_samples: true, ..self }
@@ -191,7 +207,7 @@ impl<'a> Bake<'a> {
     }
 }
 
-/// What the stages have made: a baked scene without its report.
+/// The result of the stages: a baked scene without its report.
 #[derive(Default)]
 struct BakeOutput {
     objects: Vec<BakedObject>,
@@ -200,7 +216,7 @@ struct BakeOutput {
     samples: Option<Samples>,
 }
 
-/// What a bake is asked to do, apart from whom it reports to.
+/// What the caller has requested, apart from progress and cancellation, which are the monitor's.
 struct Request<'a> {
     options: &'a BakeOptions,
     checkpoint: Option<&'a Checkpoint>,
@@ -208,7 +224,7 @@ struct Request<'a> {
     keeps_samples: bool,
 }
 
-/// Runs the stages in their order: each takes the values that those before it returned.
+/// Runs the stages in order. Each takes values that earlier stages have returned.
 fn run(
     input: &Arc<StaticScene>,
     request: &Request<'_>,
@@ -222,11 +238,11 @@ fn run(
         return Ok(nothing_to_bake("the scene has no static mesh", report));
     }
     let (space, density) = (reuse.space(input), reuse.density(input, options));
-    let layout = preparing::layout(input, space, density, options, monitor, report)?;
+    let layout = prepare::layout(input, space, density, options, monitor, report)?;
 
     monitor.stage(Stage::Hierarchy, report)?;
-    let (scene, layout, emitters) = preparing::scene(input, layout, space, monitor, report)?;
-    let sources = preparing::sources(input, &scene, emitters, monitor, report)?;
+    let (scene, layout, emitters) = prepare::scene(input, layout, space, monitor, report)?;
+    let sources = prepare::sources(input, &scene, emitters, monitor, report)?;
     if sources.is_empty() {
         let why = "no surface emits, no light is static or mixed, and there is no sky";
         return Ok(nothing_to_bake(why, report));
@@ -276,7 +292,7 @@ fn run(
         changes.as_ref().map(|changes| rebake_report(changes, &texels.list, reused.as_ref(), report))
     });
     let samples = match request.keeps_samples && report.ended != Ended::Time {
-        // A bake with more time would not want to keep what was cut short.
+        // Samples that were cut short would not be good enough for a later bake that has more time.
         false => None,
         true => Some(monitor.run_interruptible(0.0, || {
             let exitance = exchange.as_ref().map(|exchange| exchange.exitance_of(&scene, layout.maps.len()));
@@ -288,7 +304,8 @@ fn run(
     Ok(BakeOutput { objects, maps, volume, samples })
 }
 
-/// If more than this share of the time for direct light is over before any light is known, then the time is short for a scene of this size.
+/// If more than this share of the time for direct light has passed before that stage computes any light, time is short
+/// for a scene of this size.
 const SHORT_OF_TIME: f64 = 0.3;
 
 /// Reports why there is no light to bake.
@@ -299,7 +316,7 @@ fn nothing_to_bake(why: &str, report: &mut BakeReport) -> BakeOutput {
 }
 
 impl Request<'_> {
-    /// Hashes the scene, decides whether samples of a former bake can be used, and opens the checkpoint.
+    /// Hashes the scene, decides whether samples of a previous bake can be used, and opens the checkpoint.
     fn prepare_reuse(
         &self,
         input: &StaticScene,
@@ -308,7 +325,7 @@ impl Request<'_> {
     ) -> Result<Reuse<'_>, BakeError> {
         let hashes = monitor.run_interruptible(0.0, || hashes_of(input, self.options))?;
         report.content_hash = hashes.content.to_string();
-        // Samples take memory: within a limit, whether they are kept decides which patches fit.
+        // Samples take memory. If that is limited, fewer patches may fit beside them, and the light would differ.
         let limited = self.options.memory.is_some() && self.sample_bytes(self.former.is_some()) > 0;
         let reuse = Reuse::new(self.former, hashes, limited, input, self.options, report);
         if let Some(checkpoint) = self.checkpoint {
@@ -319,9 +336,10 @@ impl Request<'_> {
         Ok(reuse)
     }
 
-    /// Bytes that each covered texel takes for samples: those that this bake keeps, and those of a former bake where they are used.
+    /// Bytes per covered texel for samples: those that this bake returns, and those of the previous bake if they are
+    /// used.
     fn sample_bytes(&self, uses_former: bool) -> u64 {
-        let own = if self.keeps_samples { memory::SAMPLES_BYTES } else { 0 };
-        own + if uses_former { memory::FORMER_SAMPLES_BYTES } else { 0 }
+        let returned = if self.keeps_samples { memory::SAMPLES_BYTES } else { 0 };
+        returned + if uses_former { memory::FORMER_SAMPLES_BYTES } else { 0 }
     }
 }

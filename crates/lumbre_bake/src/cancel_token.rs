@@ -1,24 +1,26 @@
-//! The caller's wish to end a bake, as its own threads and the bake's loops see it. Not the asking: that is `progress`.
+//! The flag by which a caller cancels a bake, shared with the bake's loops. Reporting progress and turning the flag
+//! into an error is `monitor`'s.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Ends a bake from any thread; its copies are one. [`Bake::cancel`](crate::Bake::cancel) takes it.
+/// Cancels a bake from any thread. Clones share one flag. Pass a token to [`Bake::cancel`](crate::Bake::cancel).
 ///
-/// A bake that is cancelled returns within a fifth of a second or so, with [`BakeError::Cancelled`](crate::BakeError::Cancelled), and leaves the
-/// World as it was. Once cancelled, a token stays so: each bake wants one of its own.
-// Work that takes long looks at it now and then; if it is set, it returns at once with whatever fits its type: nobody will read it.
+/// A cancelled bake returns [`BakeError::Cancelled`](crate::BakeError::Cancelled) within about a fifth of a second and
+/// leaves the World unchanged. A token cannot be reset, so use a new one for each bake.
+// Long-running functions poll the flag. If it is set they return at once, with any value of their return type: it is
+// discarded.
 #[derive(Clone, Debug, Default)]
 pub struct CancelToken(Arc<AtomicBool>);
 
 impl CancelToken {
-    /// Whether nobody waits for the result any more.
+    /// Returns true if [`CancelToken::cancel`] was called on this token or a clone.
     #[inline]
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Ends the bakes that were given this token.
+    /// Cancels the bakes that were given this token.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }

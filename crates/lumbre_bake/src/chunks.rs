@@ -1,6 +1,6 @@
-//! Lists that take long, in chunks: between them the caller may cancel, the clock is looked at, and what is done is kept in the
-//! checkpoint. Not what is computed: a value depends on its index alone, so the chunks' borders show nowhere. A chunk that takes longer
-//! than those before it made expect is given up within a moment if the caller cancels.
+//! Computes long lists in chunks. Between chunks progress is reported, the bake can be cancelled or run out of time,
+//! and finished values are written to the checkpoint. A value depends on its index alone, so the result does not depend
+//! on where one chunk ends and the next begins. If the caller cancels during a chunk, its remaining values are skipped.
 
 use std::time::Instant;
 
@@ -10,14 +10,14 @@ use crate::BakeError;
 use crate::checkpoint::Record;
 use crate::monitor::BakeMonitor;
 
-/// Seconds that a chunk should take: a prompt answer, and long enough to keep the threads busy.
-const PACE: f64 = 0.1;
-/// Values of the first chunk, and of any.
-const FIRST: usize = 1024;
-const LEAST: usize = 64;
-const MOST: usize = 1 << 16;
+/// Seconds that a chunk should take: short enough for regular progress, long enough to keep all threads busy.
+const CHUNK_SECONDS: f64 = 0.1;
+/// Number of values in the first chunk, and the limits for all others.
+const FIRST_SIZE: usize = 1024;
+const MIN_SIZE: usize = 64;
+const MAX_SIZE: usize = 1 << 16;
 
-/// Computes one value per index, in order.
+/// Computes `count` values, one per index, in order.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -26,10 +26,10 @@ pub(crate) fn in_chunks<T: Send + Record>(
     monitor: &mut BakeMonitor<'_>,
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
-    chunks(count, monitor, false, compute)
+    compute_chunks(count, monitor, false, compute)
 }
 
-/// As [`in_chunks`], but it ends when the time is up: the values are then those of the first indices only.
+/// As [`in_chunks`], but stops when the time is up and then returns the values of the first indices only.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -38,10 +38,10 @@ pub(crate) fn in_chunks_until_deadline<T: Send + Record>(
     monitor: &mut BakeMonitor<'_>,
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
-    chunks(count, monitor, true, compute)
+    compute_chunks(count, monitor, true, compute)
 }
 
-/// As [`in_chunks`], of a list that is quick to make anew and so not kept in the checkpoint.
+/// As [`in_chunks`], but without the checkpoint: for lists that are quick to compute again.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -52,15 +52,15 @@ pub(crate) fn in_chunks_uncheckpointed<T: Send>(
 ) -> Result<Vec<T>, BakeError> {
     let mut values = Vec::with_capacity(count);
     while values.len() < count {
-        let end = (values.len() + LEAST).min(count);
-        values.extend(chunk(values.len(), end, count, monitor, &compute)?);
+        let end = (values.len() + MIN_SIZE).min(count);
+        values.extend(compute_chunk(values.len(), end, count, monitor, &compute)?);
         monitor.advance(values.len() as f32 / count as f32)?;
     }
     Ok(values)
 }
 
-/// The values from `start` to `end`, of `count`.
-fn chunk<T: Send>(
+/// Computes the values `start..end` of a list of `count`.
+fn compute_chunk<T: Send>(
     start: usize,
     end: usize,
     count: usize,
@@ -68,41 +68,42 @@ fn chunk<T: Send>(
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
     let stop = monitor.stop().clone();
-    let one = |index: usize| (!stop.is_cancelled()).then(|| compute(index));
-    let done = monitor
-        .run_interruptible(start as f32 / count as f32, || (start..end).into_par_iter().map(one).collect())?;
-    // None only if it was stopped, which has ended here already.
-    let done: Option<Vec<T>> = done;
-    Ok(done.unwrap_or_default())
+    let value = |index: usize| (!stop.is_cancelled()).then(|| compute(index));
+    let values: Option<Vec<T>> = monitor.run_interruptible(start as f32 / count as f32, || {
+        (start..end).into_par_iter().map(value).collect()
+    })?;
+    // `None` only after a cancellation, for which `run_interruptible` has returned an error.
+    Ok(values.unwrap_or_default())
 }
 
-fn chunks<T: Send + Record>(
+/// If `stops_at_deadline`, the list may end early, which the checkpoint records as an empty chunk.
+fn compute_chunks<T: Send + Record>(
     count: usize,
     monitor: &mut BakeMonitor<'_>,
-    may_end: bool,
+    stops_at_deadline: bool,
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
     let mut values = Vec::with_capacity(count);
-    let mut size = FIRST;
+    let mut size = FIRST_SIZE;
     while values.len() < count {
         let start = values.len();
-        if let Some(kept) = monitor.load_chunk(start, count) {
-            if kept.is_empty() && may_end {
+        if let Some(loaded) = monitor.load_chunk(start, count) {
+            if loaded.is_empty() && stops_at_deadline {
                 monitor.cut_short();
                 break;
             }
-            values.extend(kept);
-        } else if may_end && monitor.clock().is_over() {
+            values.extend(loaded);
+        } else if stops_at_deadline && monitor.clock().is_over() {
             monitor.store_chunk::<T>(start, count, &[]);
             monitor.cut_short();
             break;
         } else {
             let begun = Instant::now();
             let end = (start + size).min(count);
-            values.extend(chunk(start, end, count, monitor, &compute)?);
+            values.extend(compute_chunk(start, end, count, monitor, &compute)?);
             monitor.store_chunk(start, count, &values[start..]);
-            let wanted = size as f64 * PACE / begun.elapsed().as_secs_f64().max(1e-6);
-            size = (wanted as usize).min(4 * size).clamp(LEAST, MOST);
+            let next_size = size as f64 * CHUNK_SECONDS / begun.elapsed().as_secs_f64().max(1e-6);
+            size = (next_size as usize).min(4 * size).clamp(MIN_SIZE, MAX_SIZE);
         }
         monitor.advance(values.len() as f32 / count as f32)?;
     }

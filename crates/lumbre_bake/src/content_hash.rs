@@ -1,7 +1,8 @@
-//! One number for everything that a bake depends on, so that an unchanged scene need not be baked again and no checkpoint of another
-//! bake is continued. Not what it does not depend on: cameras, highlights, threads; of what moves only the room it takes, for the probes.
+//! Hashes of everything that a bake's result depends on. They show whether a scene has to be baked again and which of
+//! its objects have changed, and they keep a checkpoint from being resumed by another bake. What the result does not
+//! depend on is left out, such as cameras, specular reflection and the number of threads.
 //!
-//! Everything is taken apart field by field, without `..`: whoever adds a field decides here whether the bake reads it.
+//! Structures are destructured without `..`, so that whoever adds a field has to decide here whether the bake reads it.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -10,27 +11,28 @@ use std::sync::Arc;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, LightKind, Material, SpotCone, Surface};
-use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference, Wrap};
+use lumbre_optics::{AlphaMode, Attenuation, Light, Material, SpotCone, Surface};
+use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 use serde::{Deserialize, Serialize};
 
 use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, from_world};
 use crate::{BakeError, BakeOptions, Density};
 
-/// The version of the crate, and a hash of its sources and those of the crates whose work goes into a baked file.
+/// The version of the baker: that of the crate, and a hash of its sources and of the crates that influence a baked
+/// file.
 pub(crate) const BAKER: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("LUMBRE_BAKE_SOURCES"));
 
-/// A BLAKE3 hash of a bake's input; 64 hexadecimal digits when displayed.
+/// A BLAKE3 hash of a bake's input, or of a part of it. It is displayed as 64 hexadecimal digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct ContentHash([u8; 32]);
 
 impl ContentHash {
-    /// Its bytes.
+    /// The bytes of the hash.
     pub fn bytes(&self) -> &[u8; 32] {
         &self.0
     }
 
-    /// The hash of what this stands for, made from what `other` stands for.
+    /// Combines this hash with that of something else which the result was made from.
     pub(crate) fn made_from(&self, other: &Self) -> Self {
         Self(*blake3::Hasher::new().update(&self.0).update(&other.0).finalize().as_bytes())
     }
@@ -42,36 +44,41 @@ impl fmt::Display for ContentHash {
     }
 }
 
-/// The hash of everything that a [`Bake`](crate::Bake) reads of a world and its options, and of the baker itself: static meshes in their
-/// places, what their materials reflect, emit and let through with the pixels of their textures, the lights that are baked and the sky, all in
-/// the order in which they are baked; and where probes are called for, the box around what moves and which faces shine in real time. A bake does not
-/// change it: the coordinates that it gives to meshes do not count.
+/// Computes the hash of everything that a [`Bake`](crate::Bake) of this World with these options depends on, so that a
+/// level whose hash has not changed need not be baked again.
 ///
-/// Equal hashes mean equal bits, unless [`BakeOptions::time`] cuts a bake short: the hash leaves it out, like the number of threads.
-/// Only global transforms of the world are brought up to date.
+/// It covers the baker's version, the options, static meshes with their transforms, the diffuse reflection, emission
+/// and opacity of their materials with the pixels of their textures, the baked lights, and the sky, all in the order in
+/// which they are baked. If probes are baked, it also covers the bounding box of moving objects, and which emissive
+/// meshes are lights in real time. Baking a World does not change its hash, since the original meshes are hashed, not
+/// the unwrapped ones.
+///
+/// Equal hashes mean bit-identical bakes, unless [`BakeOptions::time`] cuts a bake short: the time limit and the number
+/// of threads are not hashed. The World is not changed, except that global transforms are updated.
 ///
 /// # Errors
-/// [`BakeError`] as of a bake: an option out of its range, or a mesh that cannot be read.
+/// The same [`BakeError`] as a bake, for an option out of range or an invalid mesh.
 pub fn content_hash(world: &mut World, options: &BakeOptions) -> Result<ContentHash, BakeError> {
     options.check()?;
     Ok(hashes_of(&from_world(world).0.checked()?, options).content)
 }
 
-/// The hash of everything, and those of its parts.
+/// The hash of a bake's whole input, and of parts of it that are compared with a previous bake.
 #[derive(Clone, Debug)]
 pub(crate) struct Hashes {
+    /// Hash of everything.
     pub content: ContentHash,
-    /// Of each object in its place.
+    /// Hash of each object, including its transform.
     pub objects: Vec<ContentHash>,
-    /// Of all lights and the sky.
+    /// Hash of all lights and the sky.
     pub lights: ContentHash,
-    /// Of the options that a texel's samples depend on, and of the baker.
+    /// Hash of the options that a texel's samples depend on.
     pub sampling: ContentHash,
 }
 
-/// The hashes of what was collected already.
+/// Computes all hashes of a checked scene.
 pub(crate) fn hashes_of(input: &StaticScene, options: &BakeOptions) -> Hashes {
-    // What moves counts only where probes are called for.
+    // Moving objects are hashed below, and only if probes are baked.
     let StaticScene { objects, lights, sky, moving: _ } = input;
     let mut images = Images::default();
     let object_hashes: Vec<ContentHash> =
@@ -80,17 +87,18 @@ pub(crate) fn hashes_of(input: &StaticScene, options: &BakeOptions) -> Hashes {
     let mut hasher = Hasher::new("lights");
     hasher.hashes(&light_hashes);
     hasher.color(sky);
-    let of_lights = hasher.finish();
+    let all_lights = hasher.finish();
     let mut hasher = Hasher::new("sampling");
-    let of_samples = BakeOptions::default();
+    // Options that do not influence samples are set to their defaults.
+    let default = BakeOptions::default();
     hasher.options(&BakeOptions {
-        atlas_size: of_samples.atlas_size,
-        seams: of_samples.seams,
-        resolution_error: of_samples.resolution_error,
-        probes: of_samples.probes,
-        probe_spacing: of_samples.probe_spacing,
-        separate_light: of_samples.separate_light,
-        memory: of_samples.memory,
+        atlas_size: default.atlas_size,
+        seams: default.seams,
+        resolution_error: default.resolution_error,
+        probes: default.probes,
+        probe_spacing: default.probe_spacing,
+        separate_light: default.separate_light,
+        memory: default.memory,
         ..*options
     });
     let sampling = hasher.finish();
@@ -100,44 +108,43 @@ pub(crate) fn hashes_of(input: &StaticScene, options: &BakeOptions) -> Hashes {
     for hash in &object_hashes {
         hasher.hashes(&[*hash]);
     }
-    // Objects that share their meshes share their unwrap.
-    let mut numbers: HashMap<*const TriangleMesh, u64> = HashMap::new();
-    for part in objects.iter().flat_map(|object| &object.primitives) {
-        let next = numbers.len() as u64;
-        hasher.number(*numbers.entry(Arc::as_ptr(&part.mesh)).or_insert(next));
+    // Which objects share a mesh is hashed, because they also share its unwrap.
+    let mut mesh_numbers: HashMap<*const TriangleMesh, u64> = HashMap::new();
+    for primitive in input.primitives() {
+        let next = mesh_numbers.len() as u64;
+        hasher.number(*mesh_numbers.entry(Arc::as_ptr(&primitive.mesh)).or_insert(next));
     }
     hasher.hashes(&light_hashes);
     hasher.color(sky);
     let probes = input.calls_for_probes(options).is_ok();
     hasher.number(probes.into());
     if probes {
-        // Of what moves, the place of the probes' grid.
+        // The box around moving objects determines the grid of probes.
         let (low, high) = bounds(input.moving_points());
         hasher.doubles(&[low.to_array(), high.to_array()].concat());
-        // In the order of the parts, whose lengths are hashed with their objects.
         hasher.number(input.primitives().count() as u64);
-        input.primitives().for_each(|part| hasher.number(part.lights_frames.into()));
+        input.primitives().for_each(|primitive| hasher.number(primitive.lights_frames.into()));
     }
-    Hashes { content: hasher.finish(), objects: object_hashes, lights: of_lights, sampling }
+    Hashes { content: hasher.finish(), objects: object_hashes, lights: all_lights, sampling }
 }
 
-/// Corners of the box around points; infinite and turned inside out if there is nothing.
+/// Lowest and highest corner of the points' bounding box; +∞ and -∞ if there are no points.
 fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
     let finite = points.iter().filter(|point| point.is_finite());
     finite
         .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point)))
 }
 
-/// The hash of an object in its place.
+/// The hash of an object, including its transform.
 fn object_hash(object: &SceneObject, images: &mut Images) -> ContentHash {
     let mut hasher = Hasher::new("object");
-    // The map is named after the object.
+    // The name counts because the object's map is named after it.
     let SceneObject { name, primitives, lightmap_scale } = object;
     hasher.bytes(name.as_bytes());
     hasher.doubles(&[*lightmap_scale]);
     hasher.number(primitives.len() as u64);
     for primitive in primitives {
-        // What lights frames counts with the probes, which it concerns.
+        // `lights_frames` concerns only the probes and is hashed with them.
         let PlacedPrimitive { mesh, material, textures, transform, lights_frames: _ } = primitive;
         hasher.mesh(mesh);
         hasher.material(material);
@@ -149,7 +156,7 @@ fn object_hash(object: &SceneObject, images: &mut Images) -> ContentHash {
 
 fn light_hash(placed: &PlacedLight) -> ContentHash {
     let PlacedLight { light, position, axis } = placed;
-    // Lights that are off are not baked at all; highlights, ambient terms and shadow maps are the frame's.
+    // Disabled lights are not in the list. Specular and ambient terms and shadow maps are used only in real time.
     let Light {
         kind,
         ambient: _,
@@ -165,16 +172,8 @@ fn light_hash(placed: &PlacedLight) -> ContentHash {
     } = light;
     let Attenuation { constant, linear, quadratic, clamp, range } = *attenuation;
     let mut hasher = Hasher::new("light");
-    hasher.number(match kind {
-        LightKind::Ambient => 0,
-        LightKind::Directional => 1,
-        LightKind::Point => 2,
-    });
-    hasher.number(match bake {
-        BakeMode::Dynamic => 0,
-        BakeMode::Mixed => 1,
-        BakeMode::Static => 2,
-    });
+    hasher.number(*kind as u64);
+    hasher.number(*bake as u64);
     hasher.color(diffuse);
     hasher.floats(&[constant, linear, quadratic, range, *radius, *angle]);
     hasher.number(clamp.into());
@@ -189,14 +188,12 @@ fn light_hash(placed: &PlacedLight) -> ContentHash {
             hasher.floats(&[inner, outer]);
         }
     }
-    for place in [position, axis] {
-        let DVec3 { x, y, z } = *place;
-        hasher.doubles(&[x, y, z]);
-    }
+    hasher.doubles(&position.to_array());
+    hasher.doubles(&axis.to_array());
     hasher.finish()
 }
 
-/// Hashes of pixels that were read already.
+/// Hashes of images, each computed once however many textures use it.
 #[derive(Default)]
 struct Images(HashMap<*const Image, ContentHash>);
 
@@ -213,13 +210,15 @@ impl Images {
     }
 }
 
-/// Every list is preceded by its length, every choice by its number: different inputs are different bytes.
+/// Writes values into a hash such that different inputs give different bytes: every list is preceded by its length,
+/// every option by whether it is present, every enum by the number of its variant.
 struct Hasher(blake3::Hasher);
 
 impl Hasher {
-    fn new(of: &str) -> Self {
+    /// A hasher of inputs of this kind, which also hashes the baker's version.
+    fn new(kind: &str) -> Self {
         let mut hasher = Self(blake3::Hasher::new());
-        hasher.bytes(of.as_bytes());
+        hasher.bytes(kind.as_bytes());
         hasher.bytes(BAKER.as_bytes());
         hasher
     }
@@ -237,8 +236,12 @@ impl Hasher {
         self.0.update(&value.to_le_bytes());
     }
 
+    fn numbers<const N: usize>(&mut self, values: [u64; N]) {
+        values.into_iter().for_each(|value| self.number(value));
+    }
+
     fn floats(&mut self, values: &[f32]) {
-        self.list(values.len(), values.iter().copied());
+        self.words(values.len(), values.iter().map(|value| value.to_le_bytes()));
     }
 
     fn doubles(&mut self, values: &[f64]) {
@@ -257,12 +260,20 @@ impl Hasher {
         });
     }
 
-    /// `count` of something, each some floats.
-    fn list(&mut self, count: usize, floats: impl Iterator<Item = f32>) {
-        self.words(count, floats.map(f32::to_le_bytes));
+    fn vectors<const N: usize>(&mut self, vectors: impl ExactSizeIterator<Item = [f32; N]>) {
+        self.words(vectors.len(), vectors.flatten().map(f32::to_le_bytes));
     }
 
-    /// In blocks: BLAKE3 is fast on long runs only.
+    /// Whether there is a value, and if so, what `hash` writes of it.
+    fn option<T>(&mut self, value: Option<&T>, hash: impl FnOnce(&mut Self, &T)) {
+        self.number(value.is_some().into());
+        if let Some(value) = value {
+            hash(self, value);
+        }
+    }
+
+    /// A list of `count` items, each of one or more words. Words are collected into blocks, as BLAKE3 is fast only on
+    /// long inputs.
     fn words(&mut self, count: usize, words: impl Iterator<Item = [u8; 4]>) {
         self.number(count as u64);
         let mut block = Vec::with_capacity(1 << 14);
@@ -277,7 +288,7 @@ impl Hasher {
     }
 
     fn options(&mut self, options: &BakeOptions) {
-        // The bits are the same on any number of threads, and in any time that is enough.
+        // The result does not depend on the number of threads, nor on the time limit unless it cuts the bake short.
         let BakeOptions {
             density,
             atlas_size,
@@ -297,49 +308,39 @@ impl Hasher {
             probe_spacing,
             separate_light,
             memory,
-        } = options;
+        } = *options;
         match density {
             Density::Automatic => self.number(0),
             Density::TexelsPerMeter(density) => {
                 self.number(1);
-                self.doubles(&[*density]);
+                self.doubles(&[density]);
             }
-            Density::MapSize(side) => {
-                self.number(2);
-                self.number((*side).into());
-            }
+            Density::MapSize(side) => self.numbers([2, side.into()]),
         }
-        self.doubles(&[*error]);
-        self.number(*quality as u64);
+        self.doubles(&[error]);
+        self.number(quality as u64);
         self.doubles(&[patch_texels.map_or(0.0, f64::from)]);
-        self.number((*gap).into());
-        self.number((*seed).into());
-        self.number(*form_factors as u64);
-        self.number(*solver as u64);
-        self.number((*denoise).into());
-        self.number(memory.unwrap_or(u64::MAX));
-        self.number(atlas_size.map_or(0, u64::from));
-        self.number((*seams).into());
-        // Not in the map, but in the report that stands for it.
-        self.number((*resolution_error).into());
-        self.number(*probes as u64);
+        self.numbers([gap.into(), seed.into(), form_factors as u64, solver as u64, denoise.into()]);
+        self.numbers([memory.unwrap_or(u64::MAX), atlas_size.map_or(0, u64::from), seams.into()]);
+        // `resolution_error` does not change the map, but the report, which is stored with the map.
+        self.numbers([resolution_error.into(), probes as u64]);
         self.doubles(&[probe_spacing.unwrap_or(0.0)]);
-        self.number((*separate_light).into());
+        self.number(separate_light.into());
     }
 
     fn mesh(&mut self, mesh: &TriangleMesh) {
-        // Normal maps bend no light of a bake, so that tangents do not matter.
+        // The bake does not use normal maps, and so no tangents.
         let TriangleMesh { positions, normals, tangents: _, uv0, uv1, colors, indices } = mesh;
-        self.list(positions.len(), positions.iter().flat_map(|v| v.to_array()));
-        self.list(normals.len(), normals.iter().flat_map(|v| v.to_array()));
-        self.list(uv0.len(), uv0.iter().flat_map(|v| v.to_array()));
-        self.list(uv1.len(), uv1.iter().flat_map(|v| v.to_array()));
-        self.list(colors.len(), colors.iter().flat_map(|v| v.to_array()));
+        self.vectors(positions.iter().map(|v| v.to_array()));
+        self.vectors(normals.iter().map(|v| v.to_array()));
+        self.vectors(uv0.iter().map(|v| v.to_array()));
+        self.vectors(uv1.iter().map(|v| v.to_array()));
+        self.vectors(colors.iter().map(|v| v.to_array()));
         self.words(indices.len(), indices.iter().map(|index| index.to_le_bytes()));
     }
 
     fn material(&mut self, material: &Material) {
-        // Diffuse reflection, emission and coverage are baked; what shines, mirrors or refracts is not.
+        // Diffuse reflection, emission and opacity are baked; specular reflection, mirrors and refraction are not.
         let Material {
             front,
             back,
@@ -355,12 +356,9 @@ impl Hasher {
             fresnel: _,
         } = material;
         self.surface(front);
-        self.number(back.is_some().into());
-        if let Some(back) = back {
-            self.surface(back);
-        }
+        self.option(back.as_ref(), Self::surface);
         match *alpha_mode {
-            // Alpha is ignored.
+            // Opaque materials ignore their alpha.
             AlphaMode::Opaque => self.number(0),
             AlphaMode::Mask { cutoff } => {
                 self.number(1);
@@ -371,8 +369,7 @@ impl Hasher {
                 self.floats(&[*alpha]);
             }
         }
-        self.number((*double_sided).into());
-        self.number((*unlit).into());
+        self.numbers([(*double_sided).into(), (*unlit).into()]);
     }
 
     fn surface(&mut self, surface: &Surface) {
@@ -382,37 +379,27 @@ impl Hasher {
     }
 
     fn textures(&mut self, textures: &MaterialTextures, images: &mut Images) {
-        // A lightmap holds the light on the surface as it was modelled: docs/decisions.md says why.
+        // The bake ignores normal and occlusion maps, as a lightmap holds the light on the geometric surface:
+        // docs/decisions.md says why.
         let MaterialTextures { base_color, emissive, metallic_roughness, normal: _, occlusion: _ } = textures;
         for texture in [base_color, emissive] {
-            self.number(texture.is_some().into());
-            if let Some(texture) = texture {
-                self.texture(texture, images);
-            }
+            self.option(texture.as_ref(), |hasher, texture| hasher.texture(texture, images));
         }
-        self.number(metallic_roughness.is_some().into());
-        if let Some(MetallicRoughnessTexture { texture, base_color, metallic, roughness: _, dielectric: _ }) =
-            metallic_roughness
-        {
-            self.texture(texture, images);
-            self.color(base_color);
-            self.floats(&[*metallic]);
-        }
+        self.option(metallic_roughness.as_ref(), |hasher, metallic_roughness| {
+            let MetallicRoughnessTexture { texture, base_color, metallic, roughness: _, dielectric: _ } =
+                metallic_roughness;
+            hasher.texture(texture, images);
+            hasher.color(base_color);
+            hasher.floats(&[*metallic]);
+        });
     }
 
     fn texture(&mut self, texture: &TextureReference, images: &mut Images) {
         let TextureReference { image, sampler, tex_coord, offset, rotation, scale } = texture;
         let hash = images.hash(image);
         self.hashes(&[hash]);
-        // The baker always reads bilinearly: of the sampler only the wrapping counts.
-        for wrap in [sampler.wrap_u, sampler.wrap_v] {
-            self.number(match wrap {
-                Wrap::Repeat => 0,
-                Wrap::MirroredRepeat => 1,
-                Wrap::ClampToEdge => 2,
-            });
-        }
-        self.number((*tex_coord).into());
+        // The baker always filters bilinearly, so only the sampler's wrap modes count.
+        self.numbers([sampler.wrap_u as u64, sampler.wrap_v as u64, (*tex_coord).into()]);
         self.floats(&[offset.x, offset.y, *rotation, scale.x, scale.y]);
     }
 }

@@ -1,10 +1,11 @@
-//! Why a bake ends without a result. The world is then as it was.
+//! The errors of a bake and of its checkpoint. After an error the World is as it was before the bake, except for
+//! updated global transforms.
 
-/// Why a bake ends without a result.
+/// Why a bake ended without a result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BakeError {
-    /// The progress callback asked for the end.
+    /// The progress callback or a [`CancelToken`](crate::CancelToken) cancelled the bake.
     #[error("the bake was cancelled during {stage}; the scene is unchanged")]
     Cancelled {
         /// The stage that was running.
@@ -28,7 +29,7 @@ pub enum BakeError {
         /// What is wrong.
         source: lumbre_mesh::MeshError,
     },
-    /// An object's share of texels is no number to multiply by.
+    /// An object's lightmap scale is not a positive finite number.
     #[error(
         "{object}: its lightmap scale is {found}; give a positive finite number, 1 for the density of the scene"
     )]
@@ -38,7 +39,7 @@ pub enum BakeError {
         /// What it was.
         found: String,
     },
-    /// A material reads the coordinates that the lightmap would have to replace.
+    /// A material's textures use both coordinate sets of the mesh, so that none is free for the lightmap.
     #[error(
         "{object}: the textures of its material use TEXCOORD_0 and TEXCOORD_1, and TEXCOORD_1 overlaps or tiles and so cannot hold a \
          lightmap; let them all use TEXCOORD_0, or give the mesh a TEXCOORD_1 without overlaps"
@@ -47,7 +48,7 @@ pub enum BakeError {
         /// The node's name.
         object: String,
     },
-    /// A mesh got no lightmap coordinates.
+    /// A mesh could not be unwrapped.
     #[error("{object} cannot be unwrapped: {source}")]
     Unwrap {
         /// The node's name.
@@ -55,7 +56,7 @@ pub enum BakeError {
         /// What is wrong.
         source: lumbre_mesh::UnwrapError,
     },
-    /// A mesh falls into more charts than the largest map has room for.
+    /// A mesh is unwrapped to more charts than the largest map has room for.
     #[error(
         "{object}: it falls into {charts} charts, which a lightmap of {limit} x {limit} texels does not hold; weld its vertices, split it into \
          several meshes, give it a TEXCOORD_1 of its own, or ask for a smaller gap"
@@ -63,7 +64,7 @@ pub enum BakeError {
     TooManyCharts {
         /// The node's name.
         object: String,
-        /// Pieces that an unwrap makes of it.
+        /// Number of charts.
         charts: usize,
         /// Largest side of a map, in texels.
         limit: u32,
@@ -73,12 +74,12 @@ pub enum BakeError {
         "the lightmaps would hold {texels} texels, the limit is {limit}; lower the density or the map size"
     )]
     TooManyTexels {
-        /// Texels asked for.
+        /// Texels requested.
         texels: u64,
         /// The limit.
         limit: u64,
     },
-    /// More triangles than indices can name.
+    /// The scene has more triangles than the baker's indices can address.
     #[error("the scene holds {triangles} static triangles, the limit is {limit}")]
     TooManyTriangles {
         /// Triangles found.
@@ -86,7 +87,8 @@ pub enum BakeError {
         /// The limit.
         limit: usize,
     },
-    /// Even the fewest patches and rays would need more memory than is allowed.
+    /// Even with the fewest patches and rays the bake would need more memory than
+    /// [`BakeOptions::memory`](crate::BakeOptions::memory) allows.
     #[error(
         "the bake would need {} at least, of which {} for {covered} texels, and may take {}; allow more memory, lower the density or the \
          map size, or use fewer triangles", mebibytes(*needed), mebibytes(*texels), mebibytes(*limit)
@@ -94,9 +96,9 @@ pub enum BakeError {
     Memory {
         /// Bytes needed.
         needed: u64,
-        /// Bytes of these that the texels need.
+        /// How many of them the texels need.
         texels: u64,
-        /// Texels that show a surface.
+        /// Number of texels that show a surface.
         covered: u64,
         /// Bytes allowed.
         limit: u64,
@@ -112,31 +114,31 @@ pub enum BakeError {
     /// The worker threads could not be started.
     #[error("worker threads could not be started: {reason}")]
     Threads {
-        /// What the system says.
+        /// Why not.
         reason: String,
     },
 }
 
-/// Why a checkpoint cannot be used at all: the bake does not begin. One that is merely damaged or of another bake is replaced, with a
-/// warning that says why.
+/// Why a checkpoint's file cannot be used at all, so that the bake does not start. A checkpoint that is only damaged,
+/// or that belongs to another bake, is no error: it is replaced, and a warning says why.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
-    /// Something else has the name.
+    /// The file exists and is not a checkpoint.
     #[error("the file is no checkpoint of Lumbre; move it away, or name another")]
     Foreign,
     /// Another process has it open.
     #[error("another bake is using it; wait for its end, or name another output")]
     InUse,
-    /// It cannot be read or written.
+    /// The file cannot be read or written.
     #[error("{reason}; check the folder, its permissions and the space left")]
     Unusable {
-        /// What the system says.
+        /// The operating system's message.
         reason: String,
     },
 }
 
-/// Bytes for people.
+/// Formats a number of bytes for messages, rounded up to whole MiB.
 pub(crate) fn mebibytes(bytes: u64) -> String {
     format!("{:.0} MiB", (bytes as f64 / f64::from(1 << 20)).ceil())
 }

@@ -1,23 +1,26 @@
-//! Radiosity baked into lightmaps: a World in, the same World with lit texels out; or plain meshes, materials and lights in, and maps out.
+//! Bakes radiosity into lightmaps. The input is a World, whose static objects are given lightmaps, or plain meshes,
+//! materials and lights, whose maps are returned.
 //!
-//! No GPU, no files: `lumbre_scene` loads and saves. Light bounces between patches; texels show it.
+//! The bake needs no GPU; loading scenes and saving lightmaps is `lumbre_scene`'s. Light bounces between patches, and a
+//! final gather brings it to the texels.
 //!
 //! ```text
 //!   World ─► scene ─► sources ─► coverage ─► direct_light ─► radiosity ──────► final_gather ──► finish ──► BakedScene ─► World
 //!            layout   emitters   what each   local light,    patches,          rays, rounds,    fill        uv1
 //!            BVH      lights     texel       shared samples  form factors,     error ledger     seams       Lightmap E/π
-//!            rooms    (trees)    shows            │          solver                │            pages       TexelErrors
+//!            rooms    (trees)    covers           │          solver                │            pages       TexelErrors
 //!                                                 └────────── denoise ─────────────┘
-//!            visibility: occlusion by geometry alone         probes: the same gather in the air ──────────► IrradianceVolume
+//!            visibility: occlusion by geometry alone         probes: a gather in open space ──────────────► IrradianceVolume
 //!
-//!   checkpoint: what stages have computed, in chunks ─► the same bits after an interruption
-//!   rebake: Samples of a former bake ─► what changed ─► which texels keep their direct light and their bounces ─► Samples
+//!   checkpoint: chunks of the stages' results ─► a resumed bake gives the same bits
+//!   rebake: Samples of a previous bake ─► what changed ─► which texels keep their direct light and their bounces ─► Samples
 //! ```
 //!
-//! Start at [`Bake`]: `bake.rs` calls the stages in their order, and docs/baking.md follows one photon through these folders.
+//! Start at [`Bake`]: `bake.rs` calls the stages in order, and docs/baking.md follows one photon through these folders.
 //!
-//! Everything is computed in canonical units (relative to the scene's centre, scaled by a power of two), with one seed per
-//! texel and patch: the same bits on any number of threads and at any 2^k scale of an emissive scene.
+//! Everything is computed in canonical units (relative to the scene's centre, scaled by a power of two), with one seed
+//! per texel and patch. The result is therefore bit-identical on any number of threads and, for an emissive scene, at
+//! any scale of 2^k.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -56,7 +59,7 @@ mod finish;
 mod memory;
 mod monitor;
 mod options;
-mod preparing;
+mod prepare;
 mod probes;
 mod radiosity;
 mod rebake;

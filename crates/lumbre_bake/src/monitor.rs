@@ -1,4 +1,5 @@
-//! How far a bake has come, the time it may take, and the way to end it. Not a drawing of a bar.
+//! Supervises a running bake: reports progress to the caller, measures stages, keeps the time limit, handles
+//! cancellation, and passes finished chunks to the checkpoint. How a list is divided into chunks is in `chunks`.
 
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -9,26 +10,26 @@ use crate::checkpoint::checkpoint_file::ChunkKey;
 use crate::checkpoint::{CheckpointFile, Record};
 use crate::{BakeError, BakeReport, StageTime};
 
-/// How far a bake has come.
+/// The progress of a running bake, as passed to the callback of [`Bake::progress`](crate::Bake::progress).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// What is being done, in words.
+    /// Name of the running stage, as in [`StageTime::stage`].
     pub stage: &'static str,
-    /// How much of this stage is done, in [0, 1].
+    /// Completed fraction of this stage, in [0, 1].
     pub stage_fraction: f32,
-    /// How much of the whole is done, in [0, 1], by the usual shares of the stages.
+    /// Completed fraction of the whole bake, in [0, 1], assuming that stages take their usual shares of the time.
     pub fraction: f32,
-    /// Estimated relative RMSE of the lightmap as it is now, once one is known.
+    /// Estimated relative RMSE of the lightmap as gathered so far; `None` before the first estimate.
     pub error: Option<f64>,
 }
 
-/// What is told of a bake that runs, and the answer whether it should go on.
+/// Receives the progress and answers whether the bake should continue.
 pub(crate) type Callback<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + 'a;
 
-/// How often the caller is asked while something takes long.
-const TICK: Duration = Duration::from_millis(50);
+/// Interval between calls of the progress callback during long work.
+const CALLBACK_INTERVAL: Duration = Duration::from_millis(50);
 
-/// The stages, in their order.
+/// The stages, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
     Layout,
@@ -43,13 +44,13 @@ pub(crate) enum Stage {
     Seams,
 }
 
-/// What is known of a stage before it begins.
+/// A stage's name and its part in the time of a bake.
 struct StageShare {
-    /// In words.
     name: &'static str,
-    /// Its usual share of the time.
+    /// Its usual share of the bake's time.
     of_time: f32,
-    /// The share of a time limit by which it takes no more samples: so that every stage has done something roughly before one does it well.
+    /// The share of the time limit after which this stage takes no more samples, so that time is left for a rough
+    /// result of later stages.
     of_limit: f64,
 }
 
@@ -84,53 +85,54 @@ impl Stage {
     }
 }
 
-/// The time that a bake has taken and may take.
+/// The time that a bake has taken, and its limit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clock {
     begun: Instant,
-    /// Seconds of the bakes that this one continues.
-    before: f64,
+    /// Seconds that the interrupted bakes had taken which this one resumes.
+    resumed_seconds: f64,
     limit: Option<Duration>,
 }
 
 impl Clock {
-    /// Seconds since the bake began, those of bakes that it continues included.
+    /// Seconds that the bake has taken, including those of interrupted bakes that it resumes.
     pub fn seconds(&self) -> f64 {
-        self.before + self.begun.elapsed().as_secs_f64()
+        self.resumed_seconds + self.begun.elapsed().as_secs_f64()
     }
 
-    /// The same clock with a share of the limit.
+    /// The same clock with its limit multiplied by `share`.
     pub fn until(&self, share: f64) -> Self {
         Self { limit: self.limit.map(|limit| limit.mul_f64(share)), ..*self }
     }
 
-    /// How many samples of those that are `wanted` there is time for, in all, when the ones that there `are` took so many seconds. Without a limit: all.
-    pub fn affordable(&self, are: u32, wanted: u32, seconds: f64) -> u32 {
+    /// The total number of samples, at most `wanted`, for which there is time, given that the `taken` ones so far took
+    /// `seconds`. Without a time limit, all of them.
+    pub fn affordable(&self, taken: u32, wanted: u32, seconds: f64) -> u32 {
         let Some(limit) = self.limit else { return wanted };
         let left = (limit.as_secs_f64() - self.seconds()).max(0.0);
-        let more = f64::from(are) * left / seconds.max(1e-6);
-        wanted.min(are.saturating_add(more as u32))
+        let more = f64::from(taken) * left / seconds.max(1e-6);
+        wanted.min(taken.saturating_add(more as u32))
     }
 
-    /// Whether more than a share of the time is gone. Never, without a limit.
+    /// Returns true if `share` of the time limit has passed; never true without a limit.
     pub fn is_past(&self, share: f64) -> bool {
         self.until(share).is_over()
     }
 
-    /// Whether the time is up.
+    /// Returns true if the time is up; never true without a limit.
     pub fn is_over(&self) -> bool {
         self.limit.is_some_and(|limit| self.seconds() >= limit.as_secs_f64())
     }
 }
 
-/// Reports to the caller, notes the time of each stage, and keeps what was computed.
+/// Reports progress, measures the stages, checks for cancellation, and gives access to the checkpoint.
 pub(crate) struct BakeMonitor<'a> {
     callback: &'a mut Callback<'a>,
     clock: Clock,
     is_cut_short: bool,
     stage: Option<(Stage, Instant)>,
-    /// From where to where in the running stage the work that reports now leads.
-    part: (f32, f32),
+    /// Begin and end of the current pass, as fractions of the running stage.
+    pass: (f32, f32),
     error: Option<f64>,
     stop: CancelToken,
     pub checkpoint: CheckpointFile,
@@ -138,13 +140,13 @@ pub(crate) struct BakeMonitor<'a> {
 
 impl<'a> BakeMonitor<'a> {
     pub fn new(callback: &'a mut Callback<'a>, limit: Option<Duration>) -> Self {
-        let clock = Clock { begun: Instant::now(), before: 0.0, limit };
+        let clock = Clock { begun: Instant::now(), resumed_seconds: 0.0, limit };
         let (stop, checkpoint) = (CancelToken::default(), CheckpointFile::default());
         Self {
             callback,
             clock,
             stage: None,
-            part: (0.0, 1.0),
+            pass: (0.0, 1.0),
             error: None,
             is_cut_short: false,
             stop,
@@ -152,56 +154,60 @@ impl<'a> BakeMonitor<'a> {
         }
     }
 
-    /// Ends when this token is cancelled, too.
+    /// Uses the caller's token instead of a new one.
     pub fn cancelled_by(self, stop: CancelToken) -> Self {
         Self { stop, ..self }
     }
 
-    /// What loops look at while [`BakeMonitor::run_interruptible`] waits for them.
+    /// The flag that long-running work polls, so that it returns early once the bake is cancelled.
     pub fn stop(&self) -> &CancelToken {
         &self.stop
     }
 
-    /// Something was left out for want of time.
+    /// Records that work was left out because the time was up.
     pub fn cut_short(&mut self) {
         self.is_cut_short = true;
     }
 
-    /// Whether anything was left out for want of time so far, or would be now.
+    /// Returns true if work has been left out because the time was up, or if the running stage's time is up now.
     pub fn is_late(&self) -> bool {
         self.is_cut_short || self.clock().is_over()
     }
 
-    /// The estimated error so far, for the caller.
+    /// Sets the estimated error that progress reports from now on.
     pub fn note_error(&mut self, error: f64) {
         self.error = Some(error);
     }
 
-    /// The time as it is, to be asked from other threads: the running stage's share of it.
+    /// A clock whose limit is the running stage's share of the time limit. It can be copied to other threads.
     pub fn clock(&self) -> Clock {
         self.clock.until(self.running().share().of_limit)
     }
 
-    /// Seconds since the bake began.
+    /// Seconds that the bake has taken, including those of interrupted bakes that it resumes.
     pub fn seconds(&self) -> f64 {
         self.clock.seconds()
     }
 
-    /// Ends the stage before and begins another.
+    /// Ends the running stage and begins `stage`.
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`].
     pub fn stage(&mut self, stage: Stage, report: &mut BakeReport) -> Result<(), BakeError> {
         self.end_stage(report);
         self.stage = Some((stage, Instant::now()));
-        self.part = (0.0, 1.0);
+        self.pass = (0.0, 1.0);
         self.advance(0.0)
     }
 
-    /// What comes now is one of several passes of the running stage: it takes so much, in [0, 1], of what is left of the stage.
+    /// Begins one of several passes of the running stage: it makes up `share`, in [0, 1], of the rest of the stage's
+    /// progress.
     pub fn pass(&mut self, share: f32) {
-        let begun = if self.part.1 < 1.0 { self.part.1 } else { 0.0 };
-        self.part = (begun, begun + (1.0 - begun) * share);
+        let begin = if self.pass.1 < 1.0 { self.pass.1 } else { 0.0 };
+        self.pass = (begin, begin + (1.0 - begin) * share);
     }
 
-    /// Notes the time of the running stage.
+    /// Writes the time of the running stage into the report.
     pub fn end_stage(&mut self, report: &mut BakeReport) {
         if let Some((stage, begun)) = self.stage.take() {
             report.stages.push(StageTime {
@@ -211,67 +217,70 @@ impl<'a> BakeMonitor<'a> {
         }
     }
 
-    /// Reports a fraction of the running stage, or of its pass.
+    /// Reports that `stage_fraction` of the running stage, or of its current pass, is done.
     ///
     /// # Errors
-    /// [`BakeError::Cancelled`] if the caller wants no more.
+    /// [`BakeError::Cancelled`].
     pub fn advance(&mut self, stage_fraction: f32) -> Result<(), BakeError> {
         let progress = self.progress(stage_fraction);
         if (self.callback)(progress).is_break() {
             self.stop.cancel();
         }
-        self.unless_stopped()
+        self.check_cancelled()
     }
 
-    /// Does something that may take long, from a fraction of the running stage or its pass on. Meanwhile the caller is asked again and again, from a thread of its own,
-    /// whether to go on; if not, the work finds [`BakeMonitor::stop`] set, and what it returns is forgotten. No value depends on the asking.
+    /// Runs `work` on this thread while another thread calls the progress callback regularly. If that cancels the bake,
+    /// [`BakeMonitor::stop`] is set, which `work` should poll, and its result is discarded. `stage_fraction` is the
+    /// progress of the running stage, or of its pass, at the beginning of `work`.
     ///
     /// # Errors
-    /// [`BakeError::Cancelled`] if the caller wants no more.
+    /// [`BakeError::Cancelled`].
     pub fn run_interruptible<T>(
         &mut self,
         stage_fraction: f32,
         work: impl FnOnce() -> T,
     ) -> Result<T, BakeError> {
         let progress = self.progress(stage_fraction);
-        let (callback, stop, done) = (&mut *self.callback, &self.stop, Done::default());
+        let (callback, stop, done) = (&mut *self.callback, &self.stop, DoneSignal::default());
         let result = std::thread::scope(|scope| {
-            let ask = || {
-                while !done.after(TICK) {
+            let report_until_done = || {
+                while !done.wait(CALLBACK_INTERVAL) {
                     if callback(progress).is_break() {
                         stop.cancel();
                         return;
                     }
                 }
             };
-            // Without such a thread nobody is asked before the work is done.
-            let _asked = std::thread::Builder::new().name("bake progress".into()).spawn_scoped(scope, ask);
-            // Also if the work panics: the scope waits for the thread.
-            let _finally = Finally(&done);
+            // If the thread cannot be started, the work still runs, only without progress.
+            let builder = std::thread::Builder::new().name("bake progress".into());
+            let _reporter = builder.spawn_scoped(scope, report_until_done);
+            // Sent on drop, and so even if the work panics: the scope waits for the thread, which waits for the signal.
+            let _signal = SignalOnDrop(&done);
             work()
         });
-        self.unless_stopped()?;
+        self.check_cancelled()?;
         Ok(result)
     }
 
-    /// As [`BakeMonitor::run_interruptible`], of work that cannot be asked to end: on a thread of its own, which goes on alone for a while where nobody wants its
-    /// result any more.
+    /// As [`BakeMonitor::run_interruptible`], but for work that does not poll [`BakeMonitor::stop`]. It runs on a
+    /// thread of its own, which is left to finish by itself if the bake is cancelled.
     ///
     /// # Errors
-    /// [`BakeError::Cancelled`] if the caller wants no more.
+    /// [`BakeError::Cancelled`].
     pub fn run_detached<T: Send + 'static>(
         &mut self,
         stage_fraction: f32,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, BakeError> {
         let (sender, receiver) = std::sync::mpsc::sync_channel(1);
-        // Behind a lock, so that it is still there where no thread can be had.
+        // Shared with the thread instead of moved into it, so that the work can still be run here if the thread cannot
+        // be started.
         let work = std::sync::Arc::new(Mutex::new(Some(work)));
-        let taken = std::sync::Arc::clone(&work);
+        let work_of_thread = std::sync::Arc::clone(&work);
         let take = |from: &Mutex<Option<_>>| from.lock().unwrap_or_else(PoisonError::into_inner).take();
         let thread = std::thread::Builder::new().name("bake detached".into()).spawn(move || {
-            if let Some(work) = take(&taken) {
-                // Nobody may be there to take it.
+            if let Some(work) = take(&work_of_thread) {
+                // After a cancellation nobody receives the result.
                 let _ = sender.send(work());
             }
         });
@@ -282,15 +291,15 @@ impl<'a> BakeMonitor<'a> {
             };
         };
         loop {
-            match receiver.recv_timeout(TICK) {
+            match receiver.recv_timeout(CALLBACK_INTERVAL) {
                 Ok(result) => {
-                    self.unless_stopped()?;
+                    self.check_cancelled()?;
                     return Ok(result);
                 }
                 Err(std::sync::mpsc::RecvTimeoutError::Timeout) => self.advance(stage_fraction)?,
                 Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => match thread.join() {
                     Err(panic) => std::panic::resume_unwind(panic),
-                    // It sends before it ends.
+                    // Unreachable: a thread that does not panic sends its result before it ends.
                     Ok(()) => return self.cancelled(),
                 },
             }
@@ -305,19 +314,19 @@ impl<'a> BakeMonitor<'a> {
     fn progress(&self, stage_fraction: f32) -> Progress {
         let stage = self.running();
         let StageShare { name, of_time, .. } = stage.share();
-        let before: f32 =
+        let earlier_stages: f32 =
             Stage::ALL.iter().take_while(|other| **other != stage).map(|other| other.share().of_time).sum();
-        let (from, to) = self.part;
-        let stage_fraction = from + (to - from) * stage_fraction.clamp(0.0, 1.0);
-        let fraction = (before + of_time * stage_fraction).min(1.0);
+        let (begin, end) = self.pass;
+        let stage_fraction = begin + (end - begin) * stage_fraction.clamp(0.0, 1.0);
+        let fraction = (earlier_stages + of_time * stage_fraction).min(1.0);
         Progress { stage: name, stage_fraction, fraction, error: self.error }
     }
 
-    fn unless_stopped(&mut self) -> Result<(), BakeError> {
+    fn check_cancelled(&mut self) -> Result<(), BakeError> {
         if self.stop.is_cancelled() { self.cancelled() } else { Ok(()) }
     }
 
-    /// The running stage; the first one before any has begun.
+    /// The running stage; before any has begun, the first one.
     fn running(&self) -> Stage {
         self.stage.map_or(Stage::Layout, |(stage, _)| stage)
     }
@@ -326,43 +335,44 @@ impl<'a> BakeMonitor<'a> {
         ChunkKey { stage: self.running() as u8, of, start }
     }
 
-    /// The values from `start` on, if an interrupted bake has computed them. None of them: it had no more time for the rest.
+    /// The values of a list of `of` from `start` on, if the checkpoint has them. An empty list means that the
+    /// interrupted bake had no time left for the rest.
     pub fn load_chunk<T: Record>(&mut self, start: usize, of: usize) -> Option<Vec<T>> {
         let (values, seconds) = self.checkpoint.next(self.chunk_key(start, of))?;
-        self.clock = Clock { begun: Instant::now(), before: seconds, ..self.clock };
+        self.clock = Clock { begun: Instant::now(), resumed_seconds: seconds, ..self.clock };
         Some(values)
     }
 
-    /// Keeps values, against an interruption.
+    /// Stores the values of a list of `of` from `start` on in the checkpoint.
     pub fn store_chunk<T: Record>(&mut self, start: usize, of: usize, values: &[T]) {
         let (key, seconds) = (self.chunk_key(start, of), self.seconds());
         self.checkpoint.record(key, values, seconds);
     }
 }
 
-/// Whether some work is done, for who waits for it.
+/// Tells another thread that work is done.
 #[derive(Default)]
-struct Done {
+struct DoneSignal {
     done: Mutex<bool>,
-    told: Condvar,
+    changed: Condvar,
 }
 
-impl Done {
-    /// Whether it is, after so long at most.
-    fn after(&self, time: Duration) -> bool {
+impl DoneSignal {
+    /// Waits until the work is done, but at most for `timeout`; returns true if it is done.
+    fn wait(&self, timeout: Duration) -> bool {
         let done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
-        let waited = self.told.wait_timeout_while(done, time, |done| !*done);
+        let waited = self.changed.wait_timeout_while(done, timeout, |done| !*done);
         *waited.unwrap_or_else(PoisonError::into_inner).0
     }
 }
 
-/// Says that it is, whatever happens.
-struct Finally<'a>(&'a Done);
+/// Gives the signal when it is dropped.
+struct SignalOnDrop<'a>(&'a DoneSignal);
 
-impl Drop for Finally<'_> {
+impl Drop for SignalOnDrop<'_> {
     fn drop(&mut self) {
         *self.0.done.lock().unwrap_or_else(PoisonError::into_inner) = true;
-        self.0.told.notify_all();
+        self.0.changed.notify_all();
     }
 }
 
@@ -371,12 +381,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_asks_for_the_end_while_something_runs_gets_it() {
-        let mut asked = 0;
+    fn callback_can_cancel_running_work() {
+        let mut calls = 0;
         let mut callback = |progress: Progress| {
-            asked += 1;
+            calls += 1;
             assert_eq!((progress.stage, progress.stage_fraction), ("layout", 0.25));
-            if asked < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            if calls < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
         let mut monitor = BakeMonitor::new(&mut callback, None);
         let stop = monitor.stop().clone();
@@ -388,14 +398,14 @@ mod tests {
         });
         assert_eq!(ended, Err(BakeError::Cancelled { stage: "layout" }));
         assert!(begun.elapsed() < Duration::from_secs(30));
-        assert_eq!(asked, 3);
+        assert_eq!(calls, 3);
     }
 
     #[test]
-    fn what_is_quick_asks_nobody_and_errors_are_told_on() {
-        let mut told = Vec::new();
+    fn quick_work_makes_no_callback_and_progress_carries_the_error() {
+        let mut errors = Vec::new();
         let mut callback = |progress: Progress| {
-            told.push(progress.error);
+            errors.push(progress.error);
             ControlFlow::Continue(())
         };
         let mut monitor = BakeMonitor::new(&mut callback, None);
@@ -403,19 +413,19 @@ mod tests {
         monitor.advance(0.0).unwrap();
         monitor.note_error(0.25);
         monitor.advance(1.0).unwrap();
-        assert_eq!(told, [None, Some(0.25)]);
+        assert_eq!(errors, [None, Some(0.25)]);
     }
 
     #[test]
-    fn what_runs_apart_is_waited_for_or_left_to_itself() {
+    fn detached_work_is_waited_for_or_abandoned_on_cancel() {
         let mut carry_on = |_| ControlFlow::Continue(());
         let slow = || {
-            std::thread::sleep(3 * TICK);
+            std::thread::sleep(3 * CALLBACK_INTERVAL);
             7
         };
         assert_eq!(BakeMonitor::new(&mut carry_on, None).run_detached(0.0, slow), Ok(7));
-        let (mut no_more, begun) = (|_| ControlFlow::Break(()), Instant::now());
-        let ended = BakeMonitor::new(&mut no_more, None)
+        let (mut cancel, begun) = (|_| ControlFlow::Break(()), Instant::now());
+        let ended = BakeMonitor::new(&mut cancel, None)
             .run_detached(0.0, || std::thread::sleep(Duration::from_secs(60)));
         assert_eq!(ended, Err(BakeError::Cancelled { stage: "layout" }));
         assert!(begun.elapsed() < Duration::from_secs(30));
@@ -423,14 +433,14 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "as it should")]
-    fn a_panic_apart_is_the_callers() {
+    fn panic_of_detached_work_reaches_the_caller() {
         let mut callback = |_| ControlFlow::Continue(());
         let _ = BakeMonitor::new(&mut callback, None).run_detached(0.0, || panic!("as it should"));
     }
 
     #[test]
     #[should_panic(expected = "as it should")]
-    fn a_panic_of_the_work_ends_the_asking() {
+    fn panic_of_interruptible_work_ends_the_progress_thread() {
         let mut callback = |_| ControlFlow::Continue(());
         let _ = BakeMonitor::new(&mut callback, None).run_interruptible(0.0, || panic!("as it should"));
     }

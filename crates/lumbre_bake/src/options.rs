@@ -1,4 +1,4 @@
-//! What a bake is asked for. Not how it went: that is `report`.
+//! The options of a bake. What it did with them is in `report`.
 
 use std::time::Duration;
 
@@ -6,108 +6,121 @@ use serde::{Deserialize, Serialize};
 
 use crate::BakeError;
 
-/// How many texels a surface gets.
+/// How densely surfaces are covered with lightmap texels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Density {
-    /// About 500,000 texels for the whole scene, spread by area and by the square of each object's lightmap scale: any scale of scene just works.
+    /// About 500,000 texels for the whole scene, whatever its size, distributed in proportion to surface area times the
+    /// square of each object's lightmap scale.
     #[default]
     Automatic,
-    /// Texels along one metre of surface, times each object's lightmap scale; positive and finite.
+    /// Texels per metre of surface, multiplied by each object's lightmap scale; positive and finite.
     TexelsPerMeter(f64),
-    /// The side of each node's own square map, in texels, in [4, 8192], times its lightmap scale.
+    /// Side of each object's square map in texels, in [4, 8192], multiplied by the object's lightmap scale.
     MapSize(u32),
 }
 
-/// Whether light is baked for what moves.
+/// Whether irradiance probes are baked, which light moving objects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Probes {
-    /// If something in the scene moves.
+    /// If the scene contains dynamic objects.
     #[default]
     Automatic,
-    /// Also if nothing moves yet.
+    /// Always, even without dynamic objects.
     Always,
-    /// Not at all.
+    /// Never.
     Never,
 }
 
-/// How much work the sampling may take before the error is reached.
+/// The effort of a bake: the number of patches and form factor rays, and the most samples that it takes to reach
+/// [`BakeOptions::error`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Quality {
-    /// For a look while the level is being built: few patches, few rays.
+    /// For previews while a level is being built: few patches and few rays.
     Draft,
     /// For shipping.
     #[default]
     Final,
-    /// To judge the others by: patches, form factors and rays far beyond what a game needs. Minutes, not seconds.
+    /// Ground truth for evaluating the other qualities: far more patches and rays than a game needs. Takes minutes, not
+    /// seconds.
     Reference,
 }
 
-/// How form factors are counted.
+/// How form factors are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FormFactorMethod {
-    /// Rays from points of every patch, by the cosine: F_ij is the share of i's rays that meet j first.
+    /// Cosine-distributed rays from points on every patch: F_ij is the fraction of patch i's rays that hit j first.
     #[default]
     CosineRays,
-    /// Lines spread evenly through the whole scene (Sbert, "An integral geometry based method for fast form-factor computation", 1993):
-    /// two surfaces that follow each other along a line and face each other exchange along it, both ways.
+    /// Lines distributed uniformly through the whole scene (Sbert, "An integral geometry based method for fast
+    /// form-factor computation", 1993). Two surfaces that are neighbours on a line and face each other exchange light
+    /// along it in both directions.
     GlobalLines,
 }
 
-/// An iterative method for the radiosity system. They agree; they differ in iterations.
+/// The iterative method that solves the radiosity system. All reach the same solution, in different numbers of
+/// iterations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Solver {
-    /// B ← E + ρ F B: one bounce more per iteration.
+    /// B ← E + ρ F B: each iteration adds one bounce.
     Jacobi,
-    /// The same, each patch reading what was found before it in the same sweep.
+    /// As Jacobi, but each patch reads the values already updated in the same sweep.
     GaussSeidel,
-    /// On the symmetric positive definite form [diag(A_i/ρ_i) - G] B = A_i E_i/ρ_i, with its diagonal as preconditioner.
+    /// Conjugate gradients on the symmetric positive definite form [diag(A_i/ρ_i) - G] B = A_i E_i/ρ_i, preconditioned
+    /// with its diagonal.
     #[default]
     ConjugateGradients,
 }
 
-/// What a bake is asked for.
+/// The options of a bake. The defaults suit most levels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeOptions {
-    /// How many texels a surface gets.
+    /// How densely surfaces are covered with texels.
     pub density: Density,
-    /// Relative RMSE that sampling may leave in the lightmap (0.01 is one per cent of the light around each texel); positive.
-    /// Gathering stops there, or at the quality's largest number of rays.
+    /// The target: the relative RMSE that sampling may leave in the lightmap; positive. 0.01 is one per cent of the
+    /// light around each texel. The final gather stops when its estimate reaches this, or at the quality's limit of
+    /// rays.
     pub error: f64,
-    /// Wall-clock time after which no more samples are taken: the map is complete, with what there was time for. Bits then depend on
-    /// the machine's speed.
+    /// Wall-clock time after which no more samples are taken; `None` for no limit. The map is complete all the same,
+    /// only noisier. Its bits then depend on the machine's speed.
     pub time: Option<Duration>,
-    /// How much work the sampling may take.
+    /// The effort that the bake may spend.
     pub quality: Quality,
-    /// Texels along a side of a patch, in [1, 64]: smaller patches exchange light in more detail, which only the bounces after the first see, and take more rays. The
-    /// quality's own if absent; patches are larger where the quality has no room for so many.
+    /// Side of a patch in texels, in [1, 64]; `None` for the quality's default. Smaller patches exchange light in more
+    /// detail, of which only the bounces after the first benefit, and need more rays. Patches are larger than this
+    /// where there would be more of them than the quality allows.
     pub patch_texels: Option<f32>,
-    /// Free texels between charts, and how far values are carried past a chart's border: 2 for bilinear filtering,
-    /// 4 for bicubic.
+    /// Empty texels between charts, which are filled with the values beside them so that filtering at a chart's border
+    /// reads no black: 2 for bilinear filtering, 4 for bicubic.
     pub gap: u32,
-    /// Lets the maps of several objects share atlases of at most so many texels a side, in [16, 8192]; each object has a map of
-    /// its own without it. Copies of an object then have meshes of their own, with their places in the atlas.
+    /// Largest side of an atlas in texels, in [16, 8192]. With it, the maps of several objects are packed into shared
+    /// atlases, and objects that share a mesh get copies of it with coordinates for their places in the atlas. With
+    /// `None`, each object has its own map.
     pub atlas_size: Option<u32>,
-    /// Replicates every sample sequence. The same seed gives the same bits on any number of threads.
+    /// Seed of all random numbers. The same seed gives the same bits on any number of threads.
     pub seed: u32,
-    /// Worker threads; as many as the machine has if absent.
+    /// Number of worker threads, in [1, 1024]; `None` for those of Rayon's current pool, by default one per logical
+    /// processor.
     pub threads: Option<usize>,
-    /// How form factors are counted.
+    /// How form factors are estimated.
     pub form_factors: FormFactorMethod,
     /// How the radiosity system is solved.
     pub solver: Solver,
-    /// Smooths the gathered light within charts where it is noisy.
+    /// Denoises the gathered light within each chart.
     pub denoise: bool,
-    /// Closes seams: where charts meet smoothly, both sides show the same light.
+    /// Closes seams: where charts meet on a smooth surface, both sides are made to show the same light.
     pub seams: bool,
-    /// Estimates what error the map's resolution leaves, by points baked on their own: about a twentieth of the rays.
+    /// Estimates the error that is due to the map's resolution, from points that are baked separately. Takes about a
+    /// twentieth of the rays.
     pub resolution_error: bool,
-    /// Whether light is baked for what moves.
+    /// Whether irradiance probes are baked.
     pub probes: Probes,
-    /// Metres between probes at most, positive and finite; by the scene's size, for up to 4096 of them, if absent.
+    /// Largest distance between probes in metres, positive and finite. `None` chooses it by the scene's size, for up to
+    /// 4096 probes.
     pub probe_spacing: Option<f64>,
-    /// Also gives every map's direct and bounced light as maps of their own. The maps themselves stay the same.
+    /// Additionally outputs direct and bounced light as separate maps. The combined maps stay the same.
     pub separate_light: bool,
-    /// Bytes that the bake may take beside the World: fewer patches and rays where more would not fit.
+    /// Most memory in bytes that the bake may use beside the World; `None` for no limit. Where the quality's patches
+    /// and rays do not fit, fewer are used.
     pub memory: Option<u64>,
 }
 
@@ -136,29 +149,30 @@ impl Default for BakeOptions {
     }
 }
 
-/// The numbers behind a quality.
+/// The numbers behind a [`Quality`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
-    /// Most patches that area alone asks for; every triangle has at least one.
+    /// Most patches that the surface area is divided into. There may be more, as every triangle has at least one.
     pub patches: usize,
     /// Rays for all form factors together.
     pub form_factor_rays: usize,
-    /// Texels along a patch's side, at least.
+    /// Smallest side of a patch, in texels.
     pub patch_texels: f32,
-    /// Shadow samples of a texel before and after a penumbra is found in it, and at most.
+    /// Shadow samples per texel: in the first pass, in the pass over suspected penumbrae, and at most.
     pub direct: [u32; 3],
-    /// Samples of a texel of the sources that share them: first round and most.
+    /// Samples per texel of the sources that share samples: in the first round, and at most.
     pub shared: [u32; 2],
-    /// Gather rays of a texel: first round and most.
+    /// Gather rays per texel: in the first round, and at most.
     pub gather: [u32; 2],
-    /// Most gather rays of a texel, and most samples of the sources that share them, on average, where that is more than [`FEW_RAYS`]: whatever
-    /// error is asked for, this is the most that a bake takes.
+    /// Limit for a bake's total, whatever error was requested: most gather rays, and most samples of the sources that
+    /// share them, per texel on average. The total may always be as large as [`SMALL_BUDGET`].
     pub mean: u32,
 }
 
-/// The error from which on the first rays are half of the quality's: with fewer, smoothing has too little to tell edges from noise, and rounds
-/// that have to be added cost more than was spared.
-const COARSE: f64 = 0.04;
+/// Requested errors from this on start with half of the quality's gather rays, and with fewer patches. At smaller
+/// errors that does not pay: from so few rays the smoothing cannot tell edges from noise, and the additional rounds
+/// cost more than was saved.
+const COARSE_ERROR: f64 = 0.04;
 
 impl Quality {
     fn effort(self) -> Effort {
@@ -195,25 +209,25 @@ impl Quality {
 }
 
 impl Effort {
-    /// Most samples of so many texels together.
+    /// Most samples of all `texels` together.
     pub fn budget(&self, texels: u64) -> u64 {
-        (texels * u64::from(self.mean)).max(FEW_RAYS)
+        (texels * u64::from(self.mean)).max(SMALL_BUDGET)
     }
 }
 
-/// Rays that any bake may take: seconds, however few its texels are.
-const FEW_RAYS: u64 = 32_000_000;
+/// Rays that every bake may take, however few texels it has: they take only seconds.
+const SMALL_BUDGET: u64 = 32_000_000;
 
 impl BakeOptions {
-    /// The quality's effort, less where a larger error is asked for: what is cast before anything is known must not cost more than what was
-    /// asked.
+    /// The quality's effort, reduced if a large error was requested: the rays that are cast before the error can be
+    /// estimated should not cost more than that error needs.
     pub(crate) fn effort(&self) -> Effort {
         let mut effort = self.quality.effort();
         effort.patch_texels = self.patch_texels.unwrap_or(effort.patch_texels);
         if self.quality == Quality::Reference {
             return effort;
         }
-        if self.error >= COARSE {
+        if self.error >= COARSE_ERROR {
             effort.gather[0] = (effort.gather[0] / 2).max(4);
             effort.patches = effort.patches.min(4_000);
             effort.form_factor_rays = effort.form_factor_rays.min(500_000);
@@ -222,12 +236,13 @@ impl BakeOptions {
         effort
     }
 
-    /// Options for the patches and their form factors: coarser ones if time is `short`, so that the final gather gets most of it.
-    pub(crate) fn for_patches(&self, short: bool) -> Self {
-        Self { error: if short { self.error.max(COARSE) } else { self.error }, ..*self }
+    /// Options for the patches and their form factors: coarser ones if time is short, so that most of it is left for
+    /// the final gather.
+    pub(crate) fn for_patches(&self, is_time_short: bool) -> Self {
+        Self { error: if is_time_short { self.error.max(COARSE_ERROR) } else { self.error }, ..*self }
     }
 
-    /// Names the first option that is out of its range.
+    /// Checks that all options are in range; the error names the first that is not.
     pub(crate) fn check(&self) -> Result<(), BakeError> {
         let wrong = |option, found: String, expected| Err(BakeError::Option { option, found, expected });
         match self.density {

@@ -1,74 +1,77 @@
-//! What a bake did, what it cost and how good it is. Not its drawing.
+//! The report of a bake: what it did, how long it took, and the estimated errors. Includes its text output, but not the
+//! estimation of errors, which is in `final_gather` and `finish`.
 
 use serde::{Deserialize, Serialize};
 
-/// The time of one stage.
+/// The time that one stage took.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct StageTime {
-    /// What was done, in words.
+    /// Name of the stage.
     pub stage: String,
     /// Wall-clock seconds.
     pub seconds: f64,
 }
 
-/// How good the lightmap was after some time.
+/// The lightmap's estimated error at some time during the bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ErrorAtTime {
-    /// Wall-clock seconds since the bake began, those of a bake that it continues included.
+    /// Wall-clock seconds since the bake began, including those of an interrupted bake that it resumed.
     pub seconds: f64,
     /// Estimated relative RMSE of the lightmap.
     pub error: f64,
 }
 
-/// A part of a lightmap's error.
+/// One source of a lightmap's error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ErrorPart {
-    /// Where it comes from, in words.
+    /// Where the error comes from, in words.
     pub what: String,
-    /// Estimated RMSE, relative to the light around each texel. The squares of all parts add up to that of the whole.
+    /// Estimated RMSE relative to the light around each texel. The squares of all parts add up to the square of
+    /// [`BakeReport::estimated_error`].
     pub error: f64,
 }
 
-/// The probes of a bake; all zeros without any.
+/// The irradiance probes of a bake; all zeros if there are none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ProbeReport {
-    /// Probes along x, y and z.
+    /// Number of probes along x, y and z.
     pub resolution: [u32; 3],
-    /// Metres between them.
+    /// Distance between neighbouring probes in metres, along x, y and z.
     pub spacing: [f64; 3],
-    /// How many lie inside geometry and show their neighbours' light.
+    /// Number of probes that lie inside geometry; they are given the light of their neighbours.
     pub inside: usize,
-    /// Estimated relative RMSE that sampling leaves in them.
+    /// Estimated relative RMSE that sampling leaves in the probes.
     pub estimated_error: f64,
 }
 
-/// How far a bilinear look-up in the map is from what arrives at points of the surfaces, sampling apart; zeros where it was not measured.
+/// The error that is due to the map's resolution: how far a bilinear look-up differs from the irradiance at points of
+/// the surfaces, apart from sampling errors. All zeros if it was not measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ResolutionReport {
-    /// Points at which it was measured, spread evenly over the surfaces.
+    /// Number of points at which it was measured, distributed evenly over the surfaces.
     pub points: usize,
-    /// RMSE relative to the points' mean irradiance.
+    /// RMSE relative to the mean irradiance at these points.
     pub error: f64,
-    /// Standard error of that, for so few points.
+    /// Standard error of `error`, due to the limited number of points.
     pub standard_error: f64,
 }
 
-/// A part of the level where the estimated error is larger than that of the whole.
+/// A part of the level whose estimated error is larger than that of the whole.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct WorstPlace {
-    /// The middle of its texels, metres, in the world.
+    /// Centre of its texels in world space, metres.
     pub center: [f64; 3],
-    /// Estimated RMSE of its texels, relative to the light around them.
+    /// Estimated RMSE of its texels relative to the light around them.
     pub error: f64,
-    /// Its share of all texels that show a surface, in (0, 1].
+    /// Its fraction of all texels that show a surface, in (0, 1].
     pub texels: f64,
-    /// The objects, at most two, to which most of that error belongs.
+    /// Names of the objects that contribute most to this error, at most two.
     pub objects: Vec<String>,
 }
 
@@ -80,55 +83,57 @@ impl std::fmt::Display for WorstPlace {
     }
 }
 
-/// What closing the seams did. Relative to the mean irradiance.
+/// The effect of closing the seams. All values except `edges` are relative to the mean irradiance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SeamReport {
-    /// Pairs of edges that lie in one place, join smoothly and have lightmap coordinates of their own.
+    /// Number of seams: pairs of edges that coincide in space and join smoothly, but have different lightmap
+    /// coordinates.
     pub edges: usize,
-    /// RMS difference between the two sides along them, before.
+    /// RMS difference between the two sides of the seams before they were closed.
     pub jump_before: f64,
-    /// And after.
+    /// RMS difference after they were closed.
     pub jump_after: f64,
     /// Mean change of the texels beside seams.
     pub mean_change: f64,
-    /// Largest change of a texel's channel.
+    /// Largest change of any channel of a texel.
     pub largest_change: f64,
 }
 
-/// What a bake kept of the former one.
+/// What a bake reused of the previous one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct RebakeReport {
-    /// Why nothing could be kept; empty if something was.
+    /// Why the whole scene had to be baked; empty if light could be reused.
     pub whole: String,
-    /// What differs from the former bake: objects by name, or the lights.
+    /// What differs from the previous bake: names of objects, or the lights.
     pub changed: Vec<String>,
-    /// Texels that show a surface.
+    /// Number of texels that show a surface.
     pub texels: usize,
-    /// Of them, those whose direct light was computed anew.
+    /// How many of them had their direct light computed anew.
     pub relit: usize,
-    /// Of them, those whose light by bounces was gathered anew.
+    /// How many of them had their bounced light gathered anew.
     pub gathered: usize,
-    /// RMSE relative to the mean irradiance by which the light of all others may have changed; it is part of the stated error.
+    /// RMSE due to the neglected changes of the reused light, relative to the mean irradiance. It is part of the stated
+    /// error.
     pub neglected: f64,
 }
 
 impl std::fmt::Display for RebakeReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        /// Names that are listed.
-        const NAMED: usize = 5;
+        /// Most names that are listed.
+        const MAX_NAMES: usize = 5;
         if !self.whole.is_empty() {
             return write!(f, "baked whole: {}", self.whole);
         }
-        let named = self.changed.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
-        let others = self.changed.len().saturating_sub(NAMED);
+        let names = self.changed.iter().take(MAX_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let others = self.changed.len().saturating_sub(MAX_NAMES);
         let others = if others > 0 { format!(" and {others} more") } else { String::new() };
-        let named = if named.is_empty() { "no object".to_owned() } else { named + &others };
+        let changed = if names.is_empty() { "no object".to_owned() } else { names + &others };
         let share = |count: usize| 100.0 * count as f64 / self.texels.max(1) as f64;
         write!(
             f,
-            "baked again what changed: {named}; {:.1} % of the texels gathered anew, direct light of {:.1} % anew, the others kept (their light may \
+            "baked again what changed: {changed}; {:.1} % of the texels gathered anew, direct light of {:.1} % anew, the others kept (their light may \
              have changed by {:.3} % of the mean)",
             share(self.gathered),
             share(self.relit),
@@ -137,29 +142,29 @@ impl std::fmt::Display for RebakeReport {
     }
 }
 
-/// Why a bake took no more samples.
+/// Why a bake stopped taking samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Ended {
-    /// The estimated error is at most the one asked for.
+    /// The estimated error is at most the requested one.
     #[default]
     #[serde(rename = "reached")]
     Reached,
-    /// The time was up.
+    /// The time limit was reached.
     #[serde(rename = "time")]
     Time,
-    /// The quality's most rays were cast.
+    /// The quality's limit of rays was reached.
     #[serde(rename = "most rays")]
     MostRays,
-    /// What is left of the error is not made smaller by rays.
+    /// More rays would hardly reduce the remaining error.
     #[serde(rename = "no further gain")]
     NoFurtherGain,
 }
 
 impl Ended {
-    /// By the first of these that holds.
-    pub(crate) fn after(reached: bool, late: bool, most_rays: bool) -> Self {
-        match (reached, late, most_rays) {
+    /// The first of these reasons that applies.
+    pub(crate) fn after(reached: bool, is_late: bool, most_rays: bool) -> Self {
+        match (reached, is_late, most_rays) {
             (true, ..) => Self::Reached,
             (_, true, _) => Self::Time,
             (.., true) => Self::MostRays,
@@ -179,96 +184,99 @@ impl std::fmt::Display for Ended {
     }
 }
 
-/// What a bake did, what it cost and how good it is.
+/// What a bake did, how long it took, and how large its errors are estimated to be.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct BakeReport {
-    /// The [`content_hash`](crate::content_hash) of what was baked, in hexadecimal digits.
+    /// The [`content_hash`](crate::content_hash) of the bake's input, in hexadecimal digits.
     pub content_hash: String,
     /// Wall-clock time of each stage that ran, in order.
     pub stages: Vec<StageTime>,
-    /// Wall-clock seconds of the whole.
+    /// Wall-clock seconds of the whole bake.
     pub seconds: f64,
-    /// Worker threads.
+    /// Number of worker threads.
     pub threads: usize,
-    /// Static triangles that light meets, after degenerate ones and duplicates were dropped.
+    /// Number of static triangles, without degenerate ones and duplicates.
     pub triangles: usize,
-    /// Rays cast, of every kind.
+    /// Number of rays cast, of every kind.
     pub rays: u64,
-    /// Millions of rays per second of the stages that cast them.
+    /// Millions of rays per second, over the time of the stages that cast rays.
     pub mega_rays_per_second: f64,
-    /// Patches of the radiosity system.
+    /// Number of patches of the radiosity system.
     pub patches: usize,
-    /// Pairs of patches that see each other.
+    /// Number of nonzero form factors.
     pub form_factors: usize,
-    /// Iterations of the solver, for red, green and blue.
+    /// Iterations of the solver for red, green and blue.
     pub iterations: [u32; 3],
-    /// Largest relative residual of the three channels.
+    /// Largest relative residual among the three channels.
     pub residual: f64,
     /// Bound on the relative error of the solution: residual / (1 - largest reflectance).
     pub residual_bound: f64,
-    /// Lightmaps made, atlases among them.
+    /// Number of lightmaps, including atlases.
     pub maps: usize,
-    /// Lightmaps that several objects share.
+    /// Number of lightmaps that several objects share.
     pub atlases: usize,
-    /// Texels of all maps.
+    /// Number of texels of all maps.
     pub texels: usize,
-    /// Share of the texels that a surface covers, in [0, 1].
+    /// Fraction of the texels that are covered by a surface, in [0, 1].
     pub coverage: f64,
-    /// Texels that lie wholly or partly inside other geometry; the hidden part does not count into their value.
+    /// Number of texels that lie wholly or partly inside other geometry. The hidden part does not contribute to their
+    /// value.
     pub hidden_texels: usize,
-    /// Rays of the final gather that ended on the black back of a one-sided surface, inside something closed, or left a scene that
-    /// rooms close on all sides; they bring no light.
+    /// Rays of the final gather that ended on the black back of a one-sided surface or inside a closed solid, or that
+    /// left a scene whose rooms are closed on all sides. They bring no light.
     pub leaked_rays: u64,
     /// Gather rays per covered texel, on average.
     pub gather_rays: f64,
-    /// Mean irradiance over covered texels, W/m², linear RGB.
+    /// Mean irradiance over the texels that show a surface, W/m², linear RGB.
     pub mean_irradiance: [f64; 3],
-    /// Estimated RMSE that sampling leaves in the lightmap, of each texel relative to the light around it: what an eye in that room sees.
+    /// Estimated RMSE that sampling leaves in the lightmap. The error of each texel is taken relative to the light
+    /// around it, as a viewer whose eyes have adapted to that room would see it.
     pub estimated_error: f64,
-    /// The same errors relative to the mean irradiance of the whole level.
+    /// The same errors, relative to the mean irradiance of the whole level.
     pub error_of_mean: f64,
-    /// What `estimated_error` is made of, the largest part first.
+    /// The sources of `estimated_error`, the largest first.
     #[serde(default)]
     pub error_parts: Vec<ErrorPart>,
-    /// Where it is largest: at most three places about the size of a room (an eighth of the level's longest side), each with a hundredth of all
-    /// texels or more; the worst first. Empty where no place is worse than the whole.
+    /// Where the estimated error is largest: at most three places about the size of a room (an eighth of the level's
+    /// longest side), each with at least a hundredth of all texels, the worst first. Empty if no place is worse than
+    /// the whole.
     pub worst: Vec<WorstPlace>,
-    /// That error against time: after each round of the final gather (or after direct light, where nothing bounces), and at the end. Empty
-    /// where there was nothing to bake.
+    /// The estimated error over time: after each round of the final gather (or after direct light, if nothing bounces),
+    /// and at the end. Empty if there was nothing to bake.
     pub curve: Vec<ErrorAtTime>,
-    /// Whether the estimated error is at most the one asked for.
+    /// Whether the estimated error is at most [`BakeOptions::error`](crate::BakeOptions::error).
     pub error_reached: bool,
-    /// The error that the map's resolution leaves, estimated apart.
+    /// The error that is due to the map's resolution. It is not part of `estimated_error`.
     pub resolution: ResolutionReport,
-    /// Light for what moves.
+    /// The irradiance probes, which light moving objects.
     pub probes: ProbeReport,
-    /// Why the bake took no more samples.
+    /// Why the bake stopped taking samples.
     pub ended: Ended,
-    /// Bytes that the bake was estimated to need at most, beside the World, before its long stages began.
+    /// Upper estimate of the bytes that the bake needs beside the World, made before its long stages.
     pub memory_bytes: u64,
-    /// Seconds of `seconds` that an interrupted bake had spent and this one was spared.
+    /// The part of `seconds` that was spent by an interrupted bake whose results were resumed from a checkpoint.
     pub resumed_seconds: f64,
-    /// Share of the patches' mutual exchange that was cut so that no row of form factors exceeds 1.
+    /// Fraction of the exchange between patches that was removed so that no row of form factors sums to more than 1.
     pub energy_lost: f64,
-    /// What closing the seams did; zeros where there were none.
+    /// The effect of closing the seams; all zeros if there were none.
     pub seams: SeamReport,
-    /// What was kept of a former bake; none where there was no such bake to keep from.
+    /// What was reused of a previous bake; `None` if this bake was given no samples of one.
     pub rebake: Option<RebakeReport>,
-    /// What was odd in the input, with names, and what was done about it.
+    /// What was wrong with the input, with the names of objects, and what was done about it.
     pub warnings: Vec<String>,
-    /// Work that the scene did not call for, each with its reason.
+    /// Work that was left out, each with the reason.
     pub skipped: Vec<String>,
 }
 
 impl BakeReport {
-    /// What the estimated error is made of, in a line; none where there is no error. Small parts are left out.
+    /// The sources of the estimated error in one line, without minor ones; `None` if there is no error.
     pub fn error_parts_in_words(&self) -> Option<String> {
-        /// Of the squared error, the share below which a part is small.
-        const SMALL: f64 = 0.05;
-        let told = |part: &&ErrorPart| part.error.powi(2) >= SMALL * self.estimated_error.powi(2);
-        let name = |part: &ErrorPart| format!("{} {:.2} %", part.what, 100.0 * part.error);
-        let parts: Vec<String> = self.error_parts.iter().filter(told).map(name).collect();
+        /// Parts with a smaller fraction of the squared error are minor.
+        const MINOR: f64 = 0.05;
+        let is_major = |part: &&ErrorPart| part.error.powi(2) >= MINOR * self.estimated_error.powi(2);
+        let describe = |part: &ErrorPart| format!("{} {:.2} %", part.what, 100.0 * part.error);
+        let parts: Vec<String> = self.error_parts.iter().filter(is_major).map(describe).collect();
         (!parts.is_empty()).then(|| format!("made of {} (their squares add up)", parts.join(", ")))
     }
 }

@@ -1,4 +1,5 @@
-//! What a bake writes into its report about the whole: its light, its error, its time. Not how they are computed.
+//! Writes the figures of the whole bake into its report: mean irradiance, error, worst places and times. How errors are
+//! estimated is in `final_gather`.
 
 use glam::{DVec3, Vec3};
 
@@ -11,13 +12,13 @@ use crate::monitor::BakeMonitor;
 use crate::scene::SceneObject;
 use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 
-/// Ends the last stage and writes the times.
+/// Ends the last stage and writes the times and the checkpoint's warnings.
 pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> BakeReport {
     monitor.end_stage(&mut report);
-    // Saving the result may be interrupted, too.
+    // The caller may be interrupted while it saves the result, and would then resume from here.
     monitor.checkpoint.flush();
     report.seconds = monitor.seconds();
-    // Only now is there a map with that error.
+    // Only now does a map with that error exist.
     if !report.curve.is_empty() {
         report.curve.push(ErrorAtTime { seconds: report.seconds, error: report.estimated_error });
     }
@@ -36,7 +37,8 @@ pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> B
     report
 }
 
-/// Writes what is known once every texel has its light: its mean, the error of a map without bounces, and the worst places.
+/// Writes what is known once every texel has its light: the mean irradiance, the worst places and, if nothing bounces,
+/// the error.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -52,20 +54,21 @@ pub(crate) fn write(
     let (list, errors) = (&texels.list, &indirect.variances);
     report.mean_irradiance = mean_irradiance(list, light).to_array();
     if !bounces {
-        // With bounces the rounds of the gather have stated the error.
+        // Otherwise the rounds of the gather have written the error already.
         let ledger = ErrorLedger::of_direct_light(direct);
         let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
-        let stated = MapError::new(&ledger, errors, list, &direct.local, mean);
-        stated.write_report(options.error, ledger.parts(list, &direct.local), report);
+        let error = MapError::new(&ledger, errors, list, &direct.local, mean);
+        error.write_report(options.error, ledger.parts(list, &direct.local), report);
         report.ended = Ended::after(report.error_reached, monitor.is_late(), true);
         report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
     }
-    let (squares, whole) = (direct.local.relative(&errors.expected), report.estimated_error);
-    report.worst = monitor.run_interruptible(0.0, || worst_places(scene, objects, list, &squares, whole))?;
+    let (squared_errors, whole) = (direct.local.relative(&errors.expected), report.estimated_error);
+    report.worst =
+        monitor.run_interruptible(0.0, || worst_places(scene, objects, list, &squared_errors, whole))?;
     Ok(())
 }
 
-/// Mean over the texels that show a surface, W/m².
+/// Mean irradiance over the texels that are not hidden, W/m².
 fn mean_irradiance(texels: &[Texel], light: &[Vec3]) -> DVec3 {
     let (mut sum, mut count) = (DVec3::ZERO, 0u32);
     for (_, light) in texels.iter().zip(light).filter(|(texel, _)| !texel.is_hidden()) {

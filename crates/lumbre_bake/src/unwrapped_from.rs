@@ -1,5 +1,5 @@
-//! What a bake's mesh was before it got its lightmap coordinates: the next bake of the same World reads that, and so knows what has not
-//! changed. Not the unwrap.
+//! Remembers the mesh from which a bake made an unwrapped one. The next bake of the same World reads that original, and
+//! so recognises objects that have not changed. The unwrap itself is in `scene`.
 
 use std::sync::Arc;
 
@@ -7,7 +7,8 @@ use bevy_ecs::prelude::Component;
 use lumbre_mesh::TriangleMesh;
 use lumbre_scene::{MaterialTextures, Mesh};
 
-/// Beside a [`Mesh`] that a bake has made: what it made it of. Another mesh that takes its place later, or a change of it, counts instead.
+/// Component that records from which mesh and textures a bake made the entity's unwrapped [`Mesh`]. It is ignored once
+/// the entity has been given another mesh.
 #[derive(Component, Clone, Debug)]
 pub struct UnwrappedFrom {
     source: (Arc<TriangleMesh>, Option<MaterialTextures>),
@@ -22,26 +23,29 @@ impl UnwrappedFrom {
         Self { source, made }
     }
 
-    /// The mesh as it was before.
+    /// The mesh as it was before the bake.
     pub fn mesh(&self) -> &Arc<TriangleMesh> {
         &self.source.0
     }
 
-    /// What a bake reads of an entity with such a mesh and such textures: what they were made of, if these are the ones.
+    /// The mesh and textures that a bake has to read for an entity: the originals if the entity still has the unwrapped
+    /// mesh, otherwise its current ones.
     pub(crate) fn read(
-        own: Option<&Self>,
+        unwrapped: Option<&Self>,
         mesh: &Mesh,
         textures: Option<&MaterialTextures>,
     ) -> (Arc<TriangleMesh>, Option<MaterialTextures>) {
-        let now = || (Arc::clone(&mesh.0), textures.cloned());
-        let Some(own) = own.filter(|own| Arc::ptr_eq(&own.made.0, &mesh.0)) else { return now() };
-        let moved = own.source.1 != own.made.1;
-        match (moved, own.made.1.as_ref() == textures) {
-            // Textures that the bake has left alone may be exchanged: they read what they have always read.
-            (false, _) => (Arc::clone(&own.source.0), textures.cloned()),
-            (true, true) => own.source.clone(),
-            // Made for the coordinates as they are now.
-            (true, false) => now(),
+        let current = || (Arc::clone(&mesh.0), textures.cloned());
+        let unwrapped = unwrapped.filter(|unwrapped| Arc::ptr_eq(&unwrapped.made.0, &mesh.0));
+        let Some(unwrapped) = unwrapped else { return current() };
+        let bake_changed_textures = unwrapped.source.1 != unwrapped.made.1;
+        match (bake_changed_textures, unwrapped.made.1.as_ref() == textures) {
+            // The bake has not redirected textures to other coordinates, so they fit the original mesh even if they
+            // were replaced since.
+            (false, _) => (Arc::clone(&unwrapped.source.0), textures.cloned()),
+            (true, true) => unwrapped.source.clone(),
+            // These textures were chosen for the coordinates of the unwrapped mesh.
+            (true, false) => current(),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! The covered texels with all their light, as the stages after the gather take it. Not finished maps: those are `finish`'s.
+//! The covered texels with all their light, for the stages after the gather. Finished maps are made from it in
+//! `finish`.
 
 use glam::Vec3;
 
@@ -13,6 +14,6 @@ pub(crate) struct LitTexels<'a> {
     pub texels: &'a CoveredTexels<'a>,
     pub direct: &'a DirectLight,
     pub indirect: &'a IndirectLight,
-    /// Per covered texel, direct and indirect irradiance together, W/m².
+    /// Per covered texel, the sum of direct and indirect irradiance, W/m².
     pub light: &'a [Vec3],
 }

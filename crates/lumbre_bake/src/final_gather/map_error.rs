@@ -1,4 +1,4 @@
-//! The error of a whole map, as its report states it. Not the errors of single texels: those are the `error_ledger`'s.
+//! The error of all lightmaps together, as the report states it. The errors of single texels are in `error_ledger`.
 
 use super::error_ledger::{ErrorLedger, open_sum, relative_to, root};
 use crate::coverage::footprint::Texel;
@@ -6,18 +6,19 @@ use crate::direct_light::local_light::LocalLight;
 use crate::squared_errors::SquaredErrors;
 use crate::{BakeReport, ErrorPart};
 
-/// The expected errors of all texels that show a surface, added up.
+/// The expected error over all texels that are not hidden.
 pub(crate) struct MapError {
     /// Sum of the squared errors, each relative to the light around its texel.
     pub relative_squares: f64,
-    /// Root of their mean.
+    /// Square root of their mean.
     pub relative: f64,
-    /// Root of the mean squared error over the mean irradiance of the map.
+    /// RMSE relative to the mean irradiance of the map.
     pub of_mean: f64,
 }
 
 impl MapError {
-    /// Adds up what `ledger` expects of each texel: `errors` are its total, and `mean` is the map's mean irradiance in W/m², mean of the channels.
+    /// Sums up `errors`, the ledger's total per texel. `mean` is the map's mean irradiance in W/m², mean of the
+    /// channels.
     pub fn new(
         ledger: &ErrorLedger<'_>,
         errors: &SquaredErrors,
@@ -35,7 +36,7 @@ impl MapError {
         }
     }
 
-    /// States the error in the report, what it is made of, and whether it is the `target` or less.
+    /// Writes the error, its `parts`, and whether it is at most `target`, into the report.
     pub fn write_report(&self, target: f64, parts: Vec<ErrorPart>, report: &mut BakeReport) {
         report.estimated_error = self.relative;
         report.error_of_mean = self.of_mean;

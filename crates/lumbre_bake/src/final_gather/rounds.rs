@@ -1,13 +1,16 @@
-//! Rounds of the final gather: every texel first, then those whose error is still too large, until the error asked for is
-//! reached, the time is up or the quality's most rays are cast.
+//! The rounds of the final gather. The first casts a few rays for every texel, each later one more rays where the error
+//! is still too large, until the requested error is reached, the time is up, or the quality's limit of rays is reached.
+//! How a texel gathers light is in `gather`.
 
-use crate::final_gather::map_error::MapError;
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::error_estimate::{PatchBias, patch_bias};
 use super::error_ledger::{ErrorLedger, GatherErrors, open_sum};
+use super::gather_sums::GatherSums;
+use super::map_error::MapError;
 use super::patch_fallback::from_patches;
+use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
 use super::texel_radiance::GatheredLight;
 use crate::chunks::in_chunks_until_deadline;
@@ -18,8 +21,6 @@ use crate::denoise::replicates::{Estimates, REPLICATES, mean, spread};
 use crate::denoise::smooth::smooth;
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
-use crate::final_gather::gather_sums::GatherSums;
-use crate::final_gather::radiance_cache::RadianceCache;
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::{SampleAllocation, allocate_within};
 use crate::sources::direct::Direct;
@@ -27,55 +28,60 @@ use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 
-/// Share of the squared error below which the gather's own noise is not worth more rays.
-const WORTH_RAYS: f64 = 0.1;
-/// A round's usual share of the time that this one and those after it take.
-const PASS: f32 = 0.7;
-/// Of the squared error asked for, what a round aims at: a good deal less than what ends the rounds. Its estimates are rough, and another round would
-/// smooth everything once more.
-const AIM: f64 = 0.55;
-/// The same, of what was reached, where the quality's rays are spent and a small step is missing: a round's estimates are the better the less it
-/// lowers.
-const NEAR_AIM: f64 = 0.9;
-/// What was asked, over the squared error that is left, from which on the rest is a small step; and by how much its rays may be more than the
-/// quality's most: a map that ends a hair beyond what was asked helps nobody.
-const NEAR: f64 = 0.8;
-const NEAR_RAYS: f64 = 1.25;
-/// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
-const ORDER: f64 = 1.25;
-/// The most by which a round lowers the part that rays leave: the first estimates are rough.
-const MAX_OF_A_ROUND: f64 = 8.0;
-/// Share of the samples so far below which a round is not worth its smoothing.
+/// Estimated fraction of the progress of this round and all later ones that a round makes up.
+const ROUND_PROGRESS: f32 = 0.7;
+/// More rays are not worthwhile if the error that they can reduce is less than this fraction of the squared error.
+const MIN_REDUCIBLE: f64 = 0.1;
+/// Fraction of the requested squared error that a round aims at. It is well below 1 because a round's outcome is
+/// predicted only roughly, and missing the request would cost another round, with another smoothing of everything.
+const TARGET: f64 = 0.55;
+/// The rest of the way is a small step if the requested squared error is more than this fraction of the remaining one.
+/// When the quality's rays are spent, a small step may still be taken: a map that just misses the requested error helps
+/// nobody.
+const SMALL_STEP: f64 = 0.8;
+/// A small step may raise the total number of rays to this multiple of the quality's limit.
+const SMALL_STEP_RAYS: f64 = 1.25;
+/// [`TARGET`] of a small step, per unit of the requested over the remaining squared error. It is closer to 1, as the
+/// outcome is predicted better the less a round has to reduce the error.
+const SMALL_STEP_TARGET: f64 = 0.9;
+/// Exponent p of the variance n^-p after n samples: between 1, for random samples, and 3, for a Sobol sequence and a
+/// smooth integrand.
+const CONVERGENCE_ORDER: f64 = 1.25;
+/// Largest factor by which one round tries to reduce the reducible squared error: the first estimates of it are rough.
+const MAX_REDUCTION: f64 = 8.0;
+/// The quality's rays count as spent if those left are less than this fraction of those cast: so few are not worth
+/// another smoothing.
 const MIN_ROUND: f64 = 0.15;
-/// A round that leaves more than this of the squared error that it was to lower was the last.
+/// The gather ends after a round that left more than this fraction of the squared error that it was to reduce.
 const STALLED: f64 = 0.95;
-/// The same of a round that was a small step.
-const SMALL_STEPS_END: f64 = 0.995;
+/// As [`STALLED`], for a small step, which is not expected to reduce the error by much.
+const SMALL_STEP_STALLED: f64 = 0.995;
 
-/// What the rounds have found, for every covered texel.
+/// The result of the final gather, per covered texel.
 #[derive(Default)]
 pub(crate) struct IndirectLight {
     /// Irradiance by bounces.
     pub light: Vec<Vec3>,
-    /// Of what the map then holds.
+    /// Squared errors of the map, direct light included.
     pub variances: SquaredErrors,
     pub gathered: Vec<GatherSums>,
 }
 
 impl IndirectLight {
-    /// Of a scene where nothing bounces.
+    /// For a scene where nothing bounces: no light, and the errors of direct light alone.
     pub fn none(direct: &DirectLight) -> Self {
         Self { variances: ErrorLedger::of_direct_light(direct).total(), ..Self::default() }
     }
 
-    /// The light of every covered texel, direct light included, W/m².
+    /// The sum of direct and indirect light of every covered texel, W/m².
     pub fn with(&self, direct: &DirectLight) -> Vec<Vec3> {
         let bounced = self.light.iter().copied().chain(std::iter::repeat(Vec3::ZERO));
         direct.texels.iter().zip(bounced).map(|(direct, bounced)| direct.baked + bounced).collect()
     }
 }
 
-/// Gathers the light by bounces, beginning with what is `kept` of a former bake. The cache then holds what was gathered, too.
+/// Gathers bounced light in rounds, starting with the sums `reused` from a previous bake. Afterwards the cache also
+/// holds the gathered light, for rays of later stages.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -83,7 +89,7 @@ pub(crate) fn gather(
     cache: &mut RadianceCache<'_>,
     texels: &CoveredTexels<'_>,
     direct: &DirectLight,
-    kept: Option<&ReusedGather>,
+    reused: Option<&ReusedGather>,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
@@ -93,90 +99,92 @@ pub(crate) fn gather(
     let neighbourhoods = monitor.run_interruptible(0.0, || {
         Neighbourhoods::new(cache.scene, texels.layout, list, &texels.charts, &[])
     })?;
-    let planner = RoundPlanner::new(&neighbourhoods, texels, direct, kept, options);
-    let nothing = || vec![GatherSums::default(); list.len()];
-    let mut gathered = kept.map_or_else(nothing, |kept| kept.gathered.clone());
-    let mut wanted = planner.first_samples(&gathered);
-    // With everything kept there is nothing that the former bake did not know when it ended.
-    let settled = kept.is_some() && wanted.is_empty();
-    let (mut reducible_before, mut was_small, mut is_first) = (f64::INFINITY, false, true);
-    let found = loop {
-        monitor.pass(PASS);
-        if is_first && options.time.is_some() {
-            wanted = affordable(cache, list, wanted, &mut gathered, options, monitor)?;
+    let planner = RoundPlanner::new(&neighbourhoods, texels, direct, reused, options);
+    let no_sums = || vec![GatherSums::default(); list.len()];
+    let mut gathered = reused.map_or_else(no_sums, |reused| reused.gathered.clone());
+    let wanted = planner.first_samples(&gathered);
+    // The previous bake decided that more rays were not needed. If all of it is reused, that still holds.
+    let is_all_reused = reused.is_some() && wanted.is_empty();
+    monitor.pass(ROUND_PROGRESS);
+    let mut in_time = cast_first_round(cache, list, wanted, &mut gathered, options, monitor)?;
+    let mut plan: Option<RoundPlan> = None;
+    let result = loop {
+        let result = planner.evaluate(&gathered, cache.patches.mean_reflectance(), monitor, report)?;
+        let is_late = !in_time || monitor.clock().is_over();
+        let next = planner.plan(&gathered, &result);
+        let is_hardly_reducible = next.reducible_error <= MIN_REDUCIBLE * result.relative_squares;
+        let has_stalled = plan.as_ref().is_some_and(|plan| plan.has_stalled(next.reducible_error));
+        report.ended = Ended::after(report.error_reached, is_late || monitor.is_late(), next.is_last);
+        let rays_gain_nothing = is_hardly_reducible || has_stalled;
+        if report.error_reached || is_late || rays_gain_nothing || is_all_reused || next.is_last {
+            break result;
         }
-        let in_time = cast(cache, list, &wanted, &mut gathered, options, monitor)?;
-        if is_first && !in_time {
-            from_patches(cache, list, &mut gathered);
-        }
-        is_first = false;
-        let found = planner.found(&gathered, cache.patches.mean_reflectance(), monitor, report)?;
-        let late = !in_time || monitor.clock().is_over();
-        let next = planner.next(&gathered, &found);
-        // A small step lowers little, and tells nothing of what a larger one would.
-        let stalled = if was_small { SMALL_STEPS_END } else { STALLED };
-        let is_ineffective = next.reducible_error <= WORTH_RAYS * found.sum
-            || next.reducible_error > stalled * reducible_before;
-        (reducible_before, was_small) = (next.reducible_error, next.is_small_step);
-        report.ended = Ended::after(report.error_reached, late || monitor.is_late(), next.is_last);
-        if report.error_reached || late || is_ineffective || settled || next.is_last {
-            break found;
-        }
-        wanted = next.wanted;
-        let variances = &found.unsettled.expected;
+        let variances = &result.reducible.expected;
         cache.gathered = monitor.run_interruptible(1.0, || {
-            GatheredLight::new(list, &gathered, &found.light, variances, &cache.direct)
+            GatheredLight::new(list, &gathered, &result.light, variances, &cache.direct)
         })?;
+        monitor.pass(ROUND_PROGRESS);
+        in_time = cast(cache, list, &next.wanted, &mut gathered, options, monitor)?;
+        plan = Some(next);
     };
-    let RoundResult { light, variances, .. } = found;
+    let RoundResult { light, variances, .. } = result;
     cache.gathered = monitor.run_interruptible(1.0, || {
         GatheredLight::new(list, &gathered, &light, &variances.expected, &cache.direct)
     })?;
     report.leaked_rays = cache.scene.leaks.count() - leaked_before;
-    report.rays += gathered.iter().map(|own| own.rays).sum::<u64>();
-    // Without rays: the patches' light, for want of time.
-    let cast = gathered.iter().filter(|own| own.rays > 0);
-    let cast: u64 = cast.map(|own| u64::from(own.samples) * REPLICATES as u64).sum();
+    report.rays += gathered.iter().map(|sums| sums.rays).sum::<u64>();
+    // Texels for which there was no time have no rays: their sums are the light of their patch.
+    let cast = gathered.iter().filter(|sums| sums.rays > 0);
+    let cast: u64 = cast.map(|sums| u64::from(sums.samples) * REPLICATES as u64).sum();
     report.gather_rays = cast as f64 / planner.open.len().max(1) as f64;
     Ok(IndirectLight { light, variances, gathered })
 }
 
-/// Judges what a round has gathered, and says where the next one casts its rays.
+/// Estimates light and errors after each round, and decides where the next one casts its rays.
 struct RoundPlanner<'a> {
     neighbourhoods: &'a Neighbourhoods<'a>,
     texels: &'a [Texel],
     direct: &'a [Direct],
     local: &'a LocalLight,
-    /// Of the covered texels, those that are not hidden.
+    /// The covered texels that are not hidden.
     open: Vec<CoveredTexel>,
-    /// Mean direct light of those, W/m², mean of the channels.
+    /// Mean direct light of the open texels, W/m², mean of the channels.
     mean_direct: f64,
-    /// By how much light that is kept may have changed.
+    /// Per covered texel, by how much its reused light may have changed, W/m²; empty if nothing is reused.
     reuse_error: &'a [f32],
     options: &'a BakeOptions,
 }
 
-/// What a round has found.
+/// The light and its errors after a round.
 struct RoundResult {
     /// Irradiance by bounces, per covered texel.
     light: Vec<Vec3>,
-    /// Of what the map then holds.
+    /// Squared errors of the map, direct light included.
     variances: SquaredErrors,
-    /// Of that, what more rays make smaller.
-    unsettled: SquaredErrors,
-    /// Over the open texels, the sum of their squared errors relative to the light around them.
-    sum: f64,
+    /// The part of `variances` that more rays reduce.
+    reducible: SquaredErrors,
+    /// Sum over the open texels of their squared errors, each relative to the light around its texel.
+    relative_squares: f64,
 }
 
-/// What the next round is to do.
+/// What the next round should cast.
 struct RoundPlan {
     wanted: Vec<SampleAllocation>,
-    /// Of the sum of squared errors, the part that rays make smaller.
+    /// The part of [`RoundResult::relative_squares`] that rays reduce.
     reducible_error: f64,
-    /// What is left of the quality's rays, or of the error, is not worth another round.
+    /// The quality's rays are spent, or no texel would get more: there is no next round.
     is_last: bool,
-    /// The quality's rays are spent, and it is but a small step to what was asked.
+    /// The quality's rays are spent, but the requested error is only a small step away.
     is_small_step: bool,
+}
+
+impl RoundPlan {
+    /// Returns true if the round that followed this plan hardly reduced the error: `left` is its reducible error
+    /// afterwards.
+    fn has_stalled(&self, left: f64) -> bool {
+        let stalled = if self.is_small_step { SMALL_STEP_STALLED } else { STALLED };
+        left > stalled * self.reducible_error
+    }
 }
 
 impl<'a> RoundPlanner<'a> {
@@ -184,7 +192,7 @@ impl<'a> RoundPlanner<'a> {
         neighbourhoods: &'a Neighbourhoods<'a>,
         texels: &'a CoveredTexels<'a>,
         direct: &'a DirectLight,
-        kept: Option<&'a ReusedGather>,
+        reused: Option<&'a ReusedGather>,
         options: &'a BakeOptions,
     ) -> Self {
         let list = &texels.list;
@@ -198,25 +206,25 @@ impl<'a> RoundPlanner<'a> {
             local: &direct.local,
             mean_direct: sum / open.len().max(1) as f64,
             open,
-            reuse_error: kept.map_or(&[], |kept| &kept.reuse_error),
+            reuse_error: reused.map_or(&[], |reused| &reused.reuse_error),
             options,
         }
     }
 
-    /// How many texels are judged; at least one, to be divided by.
+    /// Number of open texels; at least one, as it is divided by.
     fn count(&self) -> f64 {
         self.open.len().max(1) as f64
     }
 
-    /// The first round's, wherever nothing is kept.
+    /// The samples of the first round: the same number for every open texel for which nothing is reused.
     fn first_samples(&self, gathered: &[GatherSums]) -> Vec<SampleAllocation> {
         let samples = self.options.effort().gather[0] / REPLICATES as u32;
-        let new = self.open.iter().copied().filter(|texel| gathered[texel.place()].samples == 0);
-        new.map(|texel| SampleAllocation { texel, samples }).collect()
+        let without_samples = self.open.iter().copied().filter(|texel| gathered[texel.place()].samples == 0);
+        without_samples.map(|texel| SampleAllocation { texel, samples }).collect()
     }
 
-    /// The light that the samples tell, smoothed, with its errors; the report states them.
-    fn found(
+    /// Estimates the light from the samples, smooths it, and estimates its errors, which are written into the report.
+    fn evaluate(
         &self,
         gathered: &[GatherSums],
         reflectance: f64,
@@ -248,46 +256,56 @@ impl<'a> RoundPlanner<'a> {
         };
         let ledger = ErrorLedger { direct: self.direct, gather: Some(gather), light: total as f32 };
         let variances = ledger.total();
-        let stated = MapError::new(&ledger, &variances, texels, local, total);
+        let map_error = MapError::new(&ledger, &variances, texels, local, total);
         let parts = monitor.run_interruptible(1.0, || ledger.parts(texels, local))?;
-        stated.write_report(self.options.error, parts, report);
+        map_error.write_report(self.options.error, parts, report);
         report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
         monitor.note_error(report.estimated_error);
         monitor.advance(1.0)?;
-        let light = corrected(&estimates, &patches);
-        Ok(RoundResult { light, unsettled: ledger.by_rays(), variances, sum: stated.relative_squares })
+        let light = without_patch_bias(&estimates, &patches);
+        let (reducible, relative_squares) = (ledger.by_rays(), map_error.relative_squares);
+        Ok(RoundResult { light, variances, reducible, relative_squares })
     }
 
-    /// Rays for the part of the error that they make smaller.
-    fn next(&self, gathered: &[GatherSums], found: &RoundResult) -> RoundPlan {
-        let [_, most] = self.options.effort().gather.map(|samples| samples / REPLICATES as u32);
-        // They read texels and no patches, so that what patches left falls too; what is known of it by checks stays.
+    /// Allocates the rays of the next round such that they reduce the reducible part of the error to what is needed to
+    /// reach the requested one.
+    fn plan(&self, gathered: &[GatherSums], result: &RoundResult) -> RoundPlan {
+        let [_, max_samples] = self.options.effort().gather.map(|samples| samples / REPLICATES as u32);
+        // From the second round on, rays read the light of texels instead of patches, and so also reduce the error that
+        // was read from patches. The bias that is measured by checks against real bounces is not counted as reducible.
         let read: Vec<f32> = gathered.par_iter().map(GatherSums::squared_read_error).collect();
-        let by_rays = self.local.relative_errors(&found.unsettled.with(&read));
+        let by_rays = self.local.relative_errors(&result.reducible.with(&read));
         let reducible_error = open_sum(self.texels, &by_rays.expected);
-        // What they may leave: what the rest leaves of the error asked for, or what would not be seen beside it.
-        let rest = found.sum - reducible_error;
-        let asked = self.count() * self.options.error.powi(2);
-        let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
+        let irreducible_error = result.relative_squares - reducible_error;
+        let requested = self.count() * self.options.error.powi(2);
+
+        let samples: Vec<u32> = gathered.iter().map(|sums| sums.samples).collect();
         let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-        let most_of_all = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
-        let budget = most_of_all.saturating_sub(cast);
-        // What little is left of it is not worth another smoothing, unless that is all that is missing.
-        let spent = (budget as f64) < MIN_ROUND * cast as f64;
-        let reached = asked / found.sum.max(f64::MIN_POSITIVE);
-        let is_small_step = spent && reached > NEAR;
-        let (aim, budget) = match is_small_step {
-            true => (NEAR_AIM * reached, ((most_of_all as f64 * NEAR_RAYS) as u64).saturating_sub(cast)),
-            false => (AIM, budget),
+        let limit = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
+        let budget = limit.saturating_sub(cast);
+        let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
+        let requested_over_left = requested / result.relative_squares.max(f64::MIN_POSITIVE);
+        let is_small_step = is_spent && requested_over_left > SMALL_STEP;
+        let (target, budget) = match is_small_step {
+            true => {
+                let raised_limit = (limit as f64 * SMALL_STEP_RAYS) as u64;
+                (SMALL_STEP_TARGET * requested_over_left, raised_limit.saturating_sub(cast))
+            }
+            false => (TARGET, budget),
         };
-        let goal = (aim * asked - rest).max(WORTH_RAYS * rest).max(reducible_error / MAX_OF_A_ROUND);
-        // Rays are given out by the cautious figures; the goal is one of expected ones.
+        // The reducible error may be as large as the irreducible one leaves room for below the target, or negligible
+        // beside it.
+        let goal = (target * requested - irreducible_error)
+            .max(MIN_REDUCIBLE * irreducible_error)
+            .max(reducible_error / MAX_REDUCTION);
+        // Rays are allocated by the cautious errors, so the goal for the expected ones is scaled to those.
         let goal = goal * open_sum(self.texels, &by_rays.cautious) / reducible_error.max(f64::MIN_POSITIVE);
         let open = self.open.iter().copied();
-        let wanted = allocate_within(budget, open, &by_rays.cautious, &samples, most, ORDER, goal);
+        let errors = &by_rays.cautious;
+        let wanted = allocate_within(budget, open, errors, &samples, max_samples, CONVERGENCE_ORDER, goal);
         RoundPlan {
             reducible_error,
-            is_last: (spent && !is_small_step) || wanted.is_empty(),
+            is_last: (is_spent && !is_small_step) || wanted.is_empty(),
             is_small_step,
             wanted,
         }
@@ -299,7 +317,27 @@ fn channel_mean(light: Vec3) -> f64 {
     f64::from(light.element_sum()) / 3.0
 }
 
-/// Casts the samples that are wanted; whether there was time for all of them.
+/// Casts the first round. If there is no time for all of it, texels with no or too few samples are given the light of
+/// their patch. Returns true if there was time.
+fn cast_first_round(
+    cache: &RadianceCache<'_>,
+    texels: &[Texel],
+    mut wanted: Vec<SampleAllocation>,
+    gathered: &mut [GatherSums],
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<bool, BakeError> {
+    if options.time.is_some() {
+        wanted = limit_to_time(cache, texels, wanted, gathered, options, monitor)?;
+    }
+    let in_time = cast(cache, texels, &wanted, gathered, options, monitor)?;
+    if !in_time {
+        from_patches(cache, texels, gathered);
+    }
+    Ok(in_time)
+}
+
+/// Casts the wanted samples. Returns true if there was time for all of them.
 fn cast(
     cache: &RadianceCache<'_>,
     texels: &[Texel],
@@ -308,22 +346,22 @@ fn cast(
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<bool, BakeError> {
-    let found = in_chunks_until_deadline(wanted.len(), monitor, |place| {
+    let new_sums = in_chunks_until_deadline(wanted.len(), monitor, |place| {
         let SampleAllocation { texel, samples } = wanted[place];
-        let mut own = gathered[texel.place()];
-        cache.gather(&texels[texel.place()], &mut own, samples, options.seed);
-        own
+        let mut sums = gathered[texel.place()];
+        cache.gather(&texels[texel.place()], &mut sums, samples, options.seed);
+        sums
     })?;
-    let in_time = found.len() == wanted.len();
-    for (allocated, own) in wanted.iter().zip(found) {
-        gathered[allocated.texel.place()] = own;
+    let in_time = new_sums.len() == wanted.len();
+    for (allocated, sums) in wanted.iter().zip(new_sums) {
+        gathered[allocated.texel.place()] = sums;
     }
     Ok(in_time)
 }
 
-/// Casts one sample everywhere, and says how many of those that are wanted there is time for: a little everywhere is worth more than much in
-/// the first maps and nothing in the last.
-fn affordable(
+/// Casts one sample for each wanted texel, and returns as many of the wanted samples as there is time for at that
+/// speed: a few samples in every map are better than all of them in the first maps and none in the last.
+fn limit_to_time(
     cache: &RadianceCache<'_>,
     texels: &[Texel],
     mut wanted: Vec<SampleAllocation>,
@@ -331,22 +369,24 @@ fn affordable(
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<Vec<SampleAllocation>, BakeError> {
-    let once: Vec<SampleAllocation> =
-        wanted.iter().map(|own| SampleAllocation { samples: 1, ..*own }).collect();
+    let one_each: Vec<SampleAllocation> =
+        wanted.iter().map(|allocated| SampleAllocation { samples: 1, ..*allocated }).collect();
     let begun = monitor.seconds();
-    if !cast(cache, texels, &once, gathered, options, monitor)? {
-        // Where one was too much, those without any are the ones that are left.
-        wanted.retain(|own| gathered[own.texel.place()].samples == 0);
+    if !cast(cache, texels, &one_each, gathered, options, monitor)? {
+        // There was no time even for one each: only texels without any sample are left.
+        wanted.retain(|allocated| gathered[allocated.texel.place()].samples == 0);
         return Ok(wanted);
     }
     let (clock, seconds) = (monitor.clock(), monitor.seconds() - begun);
-    wanted.iter_mut().for_each(|own| own.samples = clock.affordable(1, own.samples, seconds));
-    wanted.retain(|own| own.samples > 1);
+    wanted.iter_mut().for_each(|allocated| {
+        allocated.samples = clock.affordable(1, allocated.samples, seconds);
+    });
+    wanted.retain(|allocated| allocated.samples > 1);
     Ok(wanted)
 }
 
-/// The estimates without what is known to be the patches' fault.
-fn corrected(estimates: &[Estimates], bias: &[PatchBias]) -> Vec<Vec3> {
-    let corrected = estimates.iter().zip(bias).map(|(e, bias)| (mean(e) - bias.correction).max(Vec3::ZERO));
-    corrected.collect()
+/// The mean of each texel's replicates, minus the known bias of the patches that its rays read.
+fn without_patch_bias(estimates: &[Estimates], bias: &[PatchBias]) -> Vec<Vec3> {
+    let unbiased = estimates.iter().zip(bias).map(|(e, bias)| (mean(e) - bias.correction).max(Vec3::ZERO));
+    unbiased.collect()
 }

@@ -1,5 +1,6 @@
-//! What comes before the light: where the texels are, the scene as light meets it, and what shines in it. The first two have steps that cannot be
-//! asked to end and so run apart from the caller's thread. Not the steps themselves.
+//! Prepares a bake before any light is computed: the lightmap layout, the scene with its hierarchies, and the light
+//! sources. Layout and scene have steps that cannot be interrupted, so they run on a detached thread. The work itself
+//! is in `scene` and `sources`.
 
 use std::sync::Arc;
 
@@ -9,10 +10,10 @@ use crate::sources::emitters::{Emitter, coarse_textures, emitters};
 use crate::sources::light_sources::{Sources, shines_inside_only};
 use crate::{BakeError, BakeOptions, BakeReport};
 
-/// Lays out every object, with so many texels per canonical unit.
+/// Lays out the lightmap of every object, with `density` texels per canonical unit.
 ///
 /// # Errors
-/// [`BakeError`] of the layout, or that nobody waits for it.
+/// [`BakeError`] of the layout, or [`BakeError::Cancelled`].
 pub(crate) fn layout(
     input: &Arc<StaticScene>,
     space: Canonical,
@@ -30,10 +31,11 @@ pub(crate) fn layout(
     layout
 }
 
-/// The scene, with its hierarchy, the layout again, and the triangles that shine.
+/// Builds the scene with its hierarchies, and finds the triangles that emit light. Also returns `layout`, which the
+/// detached thread takes by value.
 ///
 /// # Errors
-/// [`BakeError`] of the scene, or that nobody waits for it.
+/// [`BakeError`] of the scene, or [`BakeError::Cancelled`].
 pub(crate) fn scene(
     input: &Arc<StaticScene>,
     layout: LightmapLayout,
@@ -41,10 +43,10 @@ pub(crate) fn scene(
     monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<(BakeScene, LightmapLayout, Vec<Emitter>), BakeError> {
-    let (own, stop) = (Arc::clone(input), monitor.stop().clone());
+    let (shared_input, stop) = (Arc::clone(input), monitor.stop().clone());
     let (scene, layout, warnings) = monitor.run_detached(0.0, move || {
         let mut warnings = Vec::new();
-        let scene = BakeScene::new(&own.objects, &layout, space, &stop, &mut warnings);
+        let scene = BakeScene::new(&shared_input.objects, &layout, space, &stop, &mut warnings);
         (scene, layout, warnings)
     })?;
     report.warnings.extend(warnings);
@@ -55,7 +57,8 @@ pub(crate) fn scene(
     Ok((scene, layout, emitters))
 }
 
-/// What shines in the scene. The report names the kinds of light that there are none of, and textures that shine in finer detail than is sampled.
+/// Collects the light sources. The report lists the kinds of sources that the scene does not have, and warns of
+/// emissive textures with finer detail than is sampled.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
