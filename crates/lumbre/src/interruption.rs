@@ -31,7 +31,7 @@ impl Interruption {
             }
         });
         if let Err(error) = handled {
-            eprintln!("lumbre: warning: an interruption will end the bake at once: {error}");
+            eprintln!("lumbre: warning: an interruption will end the work at once, without saving it: {error}");
         }
         Self(state)
     }
