@@ -126,7 +126,7 @@ impl<'a> Shafts<'a> {
             *tiles.entry(block).or_default() += 1;
             // Where all lamps have samples of their own the sum over them is exact, and only what is hidden of it is left to rays.
             let cut = cuts.of(asked as usize);
-            for &lamp in cut.lamps.iter().filter(|_| !cut.all_apart) {
+            for &lamp in cut.lamps.iter().filter(|_| !cut.has_all_lamps) {
                 if tile.lamps.iter().all(|occluders| occluders.node != lamp) {
                     open.entry((block, lamp)).or_insert((asked, 0)).1 += 1;
                 }
