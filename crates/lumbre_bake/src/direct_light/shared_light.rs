@@ -80,7 +80,7 @@ impl Shared {
                 *sum += found.baked;
                 self.mixed += found.mixed;
                 self.inverse_distances += found.inverse_distance;
-                self.rays += u32::from(found.asked);
+                self.rays += u32::from(found.has_ray);
             }
         }
         self.samples = self.samples.max(samples);

@@ -12,8 +12,8 @@ const MAX_LEAF_TRIANGLES: usize = 4;
 struct Node {
     low: Vec3,
     high: Vec3,
-    /// Of a leaf, the index of its first item; of an inner node, the index of its second child (the first child directly
-    /// follows the node).
+    /// Of a leaf, the index of its first item; of an inner node, the index of its second child (the first child
+    /// directly follows the node).
     first: u32,
     /// The number of items in a leaf; 0 for an inner node.
     count: u32,
@@ -27,8 +27,8 @@ pub(crate) struct BoxTree {
 }
 
 impl BoxTree {
-    /// Builds the tree over triangles given by their corners. Triangles whose first corner is NaN are left out; the others
-    /// keep their indices.
+    /// Builds the tree over triangles given by their corners. Triangles whose first corner is NaN are left out; the
+    /// others keep their indices.
     pub fn new(triangles: &[[Vec3; 3]], stop: &CancelToken) -> Self {
         let mut items: Vec<u32> =
             (0..triangles.len() as u32).filter(|&index| !triangles[index as usize][0].is_nan()).collect();

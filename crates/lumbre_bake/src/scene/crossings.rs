@@ -1,5 +1,5 @@
-//! All surfaces that a line crosses, in order, and what each shows towards either end of the line. `occlusion` finds only
-//! the first hit of a ray.
+//! All surfaces that a line crosses, in order, and what each shows towards either end of the line. `occlusion` finds
+//! only the first hit of a ray.
 
 use std::cell::RefCell;
 
@@ -47,8 +47,9 @@ struct LineHit {
 }
 
 impl BakeScene {
-    /// All crossings of a line, in order. `origin` must lie before the whole scene and `direction` must be a unit vector;
-    /// `reach` is the largest distance from the coordinate origin, which sets the rounding tolerance, in canonical units.
+    /// All crossings of a line, in order. `origin` must lie before the whole scene and `direction` must be a unit
+    /// vector; `reach` is the largest distance from the coordinate origin, which sets the rounding tolerance, in
+    /// canonical units.
     pub fn crossings(&self, origin: Vec3, direction: Vec3, reach: f32) -> Vec<Crossing> {
         let hits = RefCell::new(Vec::new());
         // A traversal in which every hit is rejected continues to the end of the line, so one traversal finds all hits.
@@ -78,13 +79,13 @@ impl BakeScene {
             .collect()
     }
 
-    /// What coincident triangles, in the order in which a viewer reaches them, show to that viewer. A triangle's front faces
-    /// the viewer if its cosine has the sign `sign`. The result is the first lit side, or a black face if no side is lit or
-    /// if the viewer is inside a solid.
+    /// What coincident triangles, in the order in which a viewer reaches them, show to that viewer. A triangle's front
+    /// faces the viewer if its cosine has the sign `sign`. The result is the first lit side, or a black face if no side
+    /// is lit or if the viewer is inside a solid.
     fn face<'a>(&self, place: impl Iterator<Item = &'a LineHit> + Clone, sign: f32) -> Face {
         let solid = |hit: &LineHit| self.triangles[hit.triangle as usize].solid;
-        // The viewer is inside a solid if it sees the solid's backs here but none of its fronts; with both, the solid has
-        // no thickness here.
+        // The viewer is inside a solid if it sees the solid's backs here but none of its fronts; with both, the solid
+        // has no thickness here.
         let is_inside = |hit: &LineHit| {
             let hit_solid = solid(hit);
             let is_front = |other: &LineHit| solid(other) == hit_solid && other.cosine * sign > 0.0;

@@ -1,5 +1,5 @@
-//! Reads a World into a [`StaticScene`]: static meshes grouped into objects of one lightmap each, the lights to bake, and
-//! the places of dynamic objects.
+//! Reads a World into a [`StaticScene`]: static meshes grouped into objects of one lightmap each, the lights to bake,
+//! and the places of dynamic objects.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,5 @@
-//! Finds the sides of surfaces that can never be seen: the insides of closed meshes. Whether a point lies inside a mesh is
-//! decided by rays (`occlusion`).
+//! Finds the sides of surfaces that can never be seen: the insides of closed meshes. Whether a point lies inside a mesh
+//! is decided by rays (`occlusion`).
 
 use std::collections::HashMap;
 
@@ -7,8 +7,8 @@ use glam::Vec3;
 
 use crate::disjoint_sets::DisjointSets;
 
-/// For each triangle, the number of its connected piece if that piece is closed, that is, if every directed edge is matched
-/// by one in the opposite direction. Vertices count as the same if their coordinates are equal bit for bit.
+/// For each triangle, the number of its connected piece if that piece is closed, that is, if every directed edge is
+/// matched by one in the opposite direction. Vertices count as the same if their coordinates are equal bit for bit.
 pub(crate) fn closed_pieces(triangles: &[[Vec3; 3]]) -> Vec<Option<u32>> {
     let mut vertices: HashMap<[u32; 3], u32> = HashMap::new();
     let corners: Vec<[u32; 3]> = triangles

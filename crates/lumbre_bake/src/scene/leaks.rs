@@ -1,5 +1,6 @@
-//! Counts the rays that leak: those that end on the black back of a surface or inside a closed mesh, and those that leave a
-//! scene that is closed on all sides. It does not repair leaks: `coverage::hidden` removes texels inside geometry before.
+//! Counts the rays that leak: those that end on the black back of a surface or inside a closed mesh, and those that
+//! leave a scene that is closed on all sides. It does not repair leaks: `coverage::hidden` removes texels inside
+//! geometry before.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -1,5 +1,5 @@
-//! Lightmap coordinates and map size of every object: its own `uv1` if that is sound, else a new unwrap. Textures that read
-//! `uv1` make room for the unwrap in `texture_coordinates`.
+//! Lightmap coordinates and map size of every object: its own `uv1` if that is sound, else a new unwrap. Textures that
+//! read `uv1` make room for the unwrap in `texture_coordinates`.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -64,8 +64,8 @@ const LARGEST_SIDE: u32 = 8192;
 /// Most texels of all maps together: 4 GiB of working memory at some 64 bytes each.
 const MAX_TEXELS: u64 = 1 << 26;
 
-/// Texels per canonical unit for objects whose lightmap scale is 1; 1 if the options give the size of maps instead. Unlike a
-/// density per metre, it stays exact when the scene is scaled by 2^k.
+/// Texels per canonical unit for objects whose lightmap scale is 1; 1 if the options give the size of maps instead.
+/// Unlike a density per metre, it stays exact when the scene is scaled by 2^k.
 pub(crate) fn density_of(objects: &[SceneObject], space: Canonical, options: &BakeOptions) -> f64 {
     let area = || -> f64 {
         objects
@@ -116,8 +116,8 @@ pub(crate) fn lay_out(
     Ok(layout)
 }
 
-/// A key that is equal for objects with the same meshes whose transforms differ only by a rotation and translation: such
-/// objects share their lightmap coordinates.
+/// A key that is equal for objects with the same meshes whose transforms differ only by a rotation and translation:
+/// such objects share their lightmap coordinates.
 fn instance_key(object: &SceneObject, space: Canonical) -> Vec<u64> {
     let mut key = Vec::with_capacity(1 + object.primitives.len() * 7);
     key.push(object.lightmap_scale.to_bits());
@@ -135,8 +135,8 @@ fn instance_key(object: &SceneObject, space: Canonical) -> Vec<u64> {
             (m.y_axis, m.z_axis),
             (m.x_axis, m.z_axis),
         ] {
-            // Rotation perturbs the last bits, so products of the axes are compared rounded: lengths to the leading bits,
-            // cosines to a thousandth.
+            // Rotation perturbs the last bits, so products of the axes are compared rounded: lengths to the leading
+            // bits, cosines to a thousandth.
             let size = (a.length_squared() * b.length_squared()).sqrt();
             let cosine = if size > 0.0 { (a.dot(b) / size * 1000.0).round() } else { 0.0 };
             key.push((size * scale).to_bits() >> 40);
@@ -212,7 +212,8 @@ fn scaled_side(object: &SceneObject, side: u32) -> u32 {
     (f64::from(side) * object.lightmap_scale).round().clamp(4.0, f64::from(LARGEST_SIDE)) as u32
 }
 
-/// The object's layout by the `uv1` that its meshes have, if that can hold a lightmap; warns if it has `uv1` that cannot.
+/// The object's layout by the `uv1` that its meshes have, if that can hold a lightmap; warns if it has `uv1` that
+/// cannot.
 fn with_given_uv1(
     object: &SceneObject,
     geometry: &ObjectGeometry,
@@ -299,8 +300,8 @@ fn unwrapped_anew(
     Ok(ObjectLayout { meshes: split(&object, &unwrapped, shrink), moved, width, height })
 }
 
-/// About the densest unwrap that fits a square map, with the map's side. The side is `requested`, doubled until the charts
-/// fit at all.
+/// About the densest unwrap that fits a square map, with the map's side. The side is `requested`, doubled until the
+/// charts fit at all.
 fn unwrap_into_square(
     object: &SceneObject,
     geometry: &ObjectGeometry,
@@ -348,7 +349,8 @@ fn unwrap_into_square(
     Ok((best, side))
 }
 
-/// An unwrap at `density`, or, with a warning, at the next lower density at which its map does not exceed [`LARGEST_SIDE`].
+/// An unwrap at `density`, or, with a warning, at the next lower density at which its map does not exceed
+/// [`LARGEST_SIDE`].
 fn unwrap_at_most(
     object: &SceneObject,
     charted: &Charted<'_>,

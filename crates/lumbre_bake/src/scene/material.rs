@@ -1,4 +1,5 @@
-//! Reflectance, emission and opacity of a surface at a point, combined from material factors, vertex colours and textures.
+//! Reflectance, emission and opacity of a surface at a point, combined from material factors, vertex colours and
+//! textures.
 
 use std::sync::Arc;
 
@@ -53,8 +54,9 @@ impl SurfaceMaterial {
         texture.map_or(0.0, |texture| self.texels(texture, vertices, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]))
     }
 
-    /// Number of texels, along the longest edge of a piece of a triangle, of the finest texture that the reflectance is read
-    /// from; 0 without textures. The piece's corners are given by the weights of the triangle's second and third vertex.
+    /// Number of texels, along the longest edge of a piece of a triangle, of the finest texture that the reflectance is
+    /// read from; 0 without textures. The piece's corners are given by the weights of the triangle's second and third
+    /// vertex.
     pub fn reflectance_texels(&self, vertices: [u32; 3], piece: [(f32, f32); 3]) -> f32 {
         let Some(textures) = &self.textures else { return 0.0 };
         let metallic = textures.metallic_roughness.as_ref().map(|metallic| &metallic.texture);

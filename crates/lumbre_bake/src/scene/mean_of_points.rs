@@ -6,8 +6,8 @@ use glam::Vec3;
 /// Corners of a piece, each by the barycentric weights of the triangle's second and third vertex.
 pub(crate) type Corners = [(f32, f32); 3];
 
-/// Mean of `value` at the centroids of n² equal pieces of a triangle, given by the barycentric weights of its second and
-/// third vertex.
+/// Mean of `value` at the centroids of n² equal pieces of a triangle, given by the barycentric weights of its second
+/// and third vertex.
 pub(crate) fn mean_of_points(n: u32, mut value: impl FnMut((f32, f32)) -> Vec3) -> Vec3 {
     if n <= 1 {
         return value((1.0 / 3.0, 1.0 / 3.0));

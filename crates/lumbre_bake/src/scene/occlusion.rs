@@ -1,5 +1,5 @@
-//! What a ray hits first: a lit side of a surface, a black back, the inside of a closed mesh, or nothing. `crossings` finds
-//! everything along a line.
+//! What a ray hits first: a lit side of a surface, a black back, the inside of a closed mesh, or nothing. `crossings`
+//! finds everything along a line.
 
 use glam::Vec3;
 use lumbre_rays::{Hit, Ray, offset_ray_origin};
@@ -32,13 +32,14 @@ pub(crate) enum SurfaceHit {
 /// Hits closer together than this fraction of their distance and coordinates count as coincident.
 pub(super) const SAME_PLACE: f32 = 64.0 / (1 << 24) as f32;
 
-/// Where a segment ends, as a fraction of its length. The target is offset from its surface by the rounding error of its own
-/// coordinates only. On a segment much longer than those coordinates, the surface may be hit some rounding errors of the
-/// distance before or behind its true position, so the segment is shortened by as much.
+/// Where a segment ends, as a fraction of its length. The target is offset from its surface by the rounding error of
+/// its own coordinates only. On a segment much longer than those coordinates, the surface may be hit some rounding
+/// errors of the distance before or behind its true position, so the segment is shortened by as much.
 const SEGMENT_END: f32 = 1.0 - 16.0 / (1 << 24) as f32;
 
 impl BakeScene {
-    /// The first hit of a ray; `direction` must be a unit vector. Counts the ray as a leak if it ends where no ray should.
+    /// The first hit of a ray; `direction` must be a unit vector. Counts the ray as a leak if it ends where no ray
+    /// should.
     pub fn first_hit(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
         let hit = self.first_surface(origin, direction, |_| true);
         match hit {
@@ -55,8 +56,8 @@ impl BakeScene {
         let Some(mut hit) = self.closest(&ray, &counts) else { return SurfaceHit::None };
         let triangle = &self.triangles[hit.triangle as usize];
         if hit.back_face && !triangle.two_sided {
-            // Of the two coincident faces of a sheet, choose the one that faces the ray. From inside a solid, do not choose
-            // the surface that the solid stands on.
+            // Of the two coincident faces of a sheet, choose the one that faces the ray. From inside a solid, do not
+            // choose the surface that the solid stands on.
             let near = self.near(&ray, hit.triangle, hit.distance, direction);
             let faces_ray = |index: u32| {
                 let other = &self.triangles[index as usize];
@@ -73,9 +74,10 @@ impl BakeScene {
         SurfaceHit::Lit { triangle: hit.triangle, side, at: hit.barycentric, distance: hit.distance }
     }
 
-    /// Like [`first_hit`](Self::first_hit), but also decides whether the ray started inside something, at up to three times
-    /// the cost. Where a solid stands on a surface, the two coincide, and a ray from inside the solid may hit either first. A
-    /// ray that leaves a scene that is dark outside started outside of its rooms, which counts as inside.
+    /// Like [`first_hit`](Self::first_hit), but also decides whether the ray started inside something, at up to three
+    /// times the cost. Where a solid stands on a surface, the two coincide, and a ray from inside the solid may hit
+    /// either first. A ray that leaves a scene that is dark outside started outside of its rooms, which counts as
+    /// inside.
     pub fn classify_hit(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
         let hit = self.first_hit(origin, direction);
         let SurfaceHit::Lit { triangle, distance, .. } = hit else {
@@ -118,8 +120,8 @@ impl BakeScene {
         offset_ray_origin(position, triangle.side_normal(side), triangle.extent)
     }
 
-    /// A point just off a side of a triangle, as the end of a segment from `from`. The offset covers the rounding error of the
-    /// coordinates of both ends; else a small lamp near the origin would shadow itself.
+    /// A point just off a side of a triangle, as the end of a segment from `from`. The offset covers the rounding error
+    /// of the coordinates of both ends; else a small lamp near the origin would shadow itself.
     pub fn off_surface_seen_from(&self, triangle: u32, side: Side, position: Vec3, from: Vec3) -> Vec3 {
         let triangle = &self.triangles[triangle as usize];
         let extent = triangle.extent.max(from.abs().max_element());

@@ -7,8 +7,8 @@ use glam::{DVec3, Vec3};
 pub(crate) struct Room {
     low: Vec3,
     high: Vec3,
-    /// The planes of a convex room: inward unit normals with their distance from the coordinate origin. Empty if the room is
-    /// not convex or has more than [`MAX_SIDES`] triangles.
+    /// The planes of a convex room: inward unit normals with their distance from the coordinate origin. Empty if the
+    /// room is not convex or has more than [`MAX_SIDES`] triangles.
     sides: Vec<(DVec3, f64)>,
 }
 
@@ -39,7 +39,8 @@ impl Room {
         TOUCHING * self.low.abs().max(self.high.abs()).max_element()
     }
 
-    /// Whether a point is inside the room or on its sides; `false` also where this is unknown, because no planes are stored.
+    /// Whether a point is inside the room or on its sides; `false` also where this is unknown, because no planes are
+    /// stored.
     pub fn contains(&self, point: Vec3) -> bool {
         let (place, slack) = (point.as_dvec3(), f64::from(self.slack()));
         !self.sides.is_empty()
@@ -67,8 +68,8 @@ pub(crate) struct Piece {
     pub room: Option<Room>,
 }
 
-/// The closed pieces in ascending order of their numbers. `pieces` gives for each triangle the number of its closed piece, if
-/// any.
+/// The closed pieces in ascending order of their numbers. `pieces` gives for each triangle the number of its closed
+/// piece, if any.
 pub(crate) fn pieces(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<Piece> {
     let mut order: Vec<(u32, usize)> =
         pieces.iter().enumerate().filter_map(|(index, piece)| Some(((*piece)?, index))).collect();

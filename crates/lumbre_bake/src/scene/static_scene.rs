@@ -1,6 +1,6 @@
-//! The baker's input as plain data: placed meshes with their materials, lights, the sky, and the places of moving objects.
-//! `from_world` reads it from a World; callers without a World fill it in themselves. `triangles` derives from it the scene
-//! that the baker computes with.
+//! The baker's input as plain data: placed meshes with their materials, lights, the sky, and the places of moving
+//! objects. `from_world` reads it from a World; callers without a World fill it in themselves. `triangles` derives from
+//! it the scene that the baker computes with.
 
 use std::sync::Arc;
 
@@ -25,7 +25,8 @@ pub struct PlacedPrimitive {
     pub textures: Option<MaterialTextures>,
     /// From the mesh's local space to the world.
     pub transform: DAffine3,
-    /// The renderer draws its emission as polygon lights in each frame, so probes leave that light out; lightmaps include it.
+    /// The renderer draws its emission as polygon lights in each frame, so probes leave that light out; lightmaps
+    /// include it.
     pub lights_frames: bool,
 }
 
@@ -51,8 +52,8 @@ pub struct PlacedLight {
     pub axis: DVec3,
 }
 
-/// The input of a bake as plain data. The order of objects and lights decides the random numbers, so the same order gives the
-/// same bits.
+/// The input of a bake as plain data. The order of objects and lights decides the random numbers, so the same order
+/// gives the same bits.
 #[derive(Clone, Debug, Default)]
 pub struct StaticScene {
     /// The static geometry: everything that receives, reflects, emits or blocks light.
@@ -73,7 +74,8 @@ impl SceneObject {
 }
 
 impl PlacedLight {
-    /// Whether it has a size: an angle for directional lights, a radius for the others. Each kind ignores the other value.
+    /// Whether it has a size: an angle for directional lights, a radius for the others. Each kind ignores the other
+    /// value.
     pub(crate) fn is_sized(&self) -> bool {
         match self.light.kind {
             LightKind::Directional => self.light.angle > 0.0,

@@ -34,8 +34,8 @@ pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
 fn wrap(index: f32, size: u32, wrap: Wrap) -> usize {
     let size_f = size.max(1) as f32;
     let last = size.max(1) as usize - 1;
-    // The remainder without the slow exact `%`. For large indices, rounding may be off by a texel, so the result is clamped
-    // below.
+    // The remainder without the slow exact `%`. For large indices, rounding may be off by a texel, so the result is
+    // clamped below.
     let remainder = |period: f32| index - period * (index / period).floor();
     let wrapped = match wrap {
         Wrap::Repeat => remainder(size_f),

@@ -1,6 +1,6 @@
 //! Frees `uv1` for lightmap coordinates where a material's textures read it: the textures' coordinates move to `uv0` if
-//! nothing reads that, and normal and occlusion maps, which no bake reads, are dropped if necessary. The unwrap that then
-//! fills `uv1` is in `lightmap_layout`.
+//! nothing reads that, and normal and occlusion maps, which no bake reads, are dropped if necessary. The unwrap that
+//! then fills `uv1` is in `lightmap_layout`.
 
 use std::sync::Arc;
 
@@ -32,8 +32,8 @@ fn reads_different_sets(mesh: &TriangleMesh, textures: Option<&MaterialTextures>
     sets_read(textures) == [true, true] && mesh.uv0 != mesh.uv1
 }
 
-/// The textures of a mesh, all reading `uv0`. If they read two different sets, the normal and occlusion maps on `uv1` are
-/// dropped, since there is no set left for them.
+/// The textures of a mesh, all reading `uv0`. If they read two different sets, the normal and occlusion maps on `uv1`
+/// are dropped, since there is no set left for them.
 pub(crate) fn reading_first(mesh: &TriangleMesh, textures: &MaterialTextures) -> MaterialTextures {
     let mut textures = match reads_different_sets(mesh, Some(textures)) {
         true => without_second_surface_maps(textures),
@@ -48,8 +48,8 @@ pub(crate) fn reading_first(mesh: &TriangleMesh, textures: &MaterialTextures) ->
 /// The object with `uv1` free for the lightmap, and for each primitive whether its textures were changed to read `uv0`.
 ///
 /// # Errors
-/// [`BakeError::CoordinatesInUse`] if both sets are read, differ, and `uv1` is read by more than normal and occlusion maps: a
-/// mesh has no third set.
+/// [`BakeError::CoordinatesInUse`] if both sets are read, differ, and `uv1` is read by more than normal and occlusion
+/// maps: a mesh has no third set.
 pub(crate) fn free_second(object: &SceneObject) -> Result<(SceneObject, Vec<bool>), BakeError> {
     let mut freed = object.clone();
     let mut moved = vec![false; object.primitives.len()];

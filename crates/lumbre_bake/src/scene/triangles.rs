@@ -85,8 +85,8 @@ pub(crate) struct SceneTriangle {
     pub two_sided: bool,
     /// Whether it belongs to a closed piece of its mesh, so that a ray that hits its back started inside.
     pub closed: bool,
-    /// The number of its closed piece, if that is a solid (its fronts face outward). No light enters a solid, even through
-    /// surfaces that coincide with its outside.
+    /// The number of its closed piece, if that is a solid (its fronts face outward). No light enters a solid, even
+    /// through surfaces that coincide with its outside.
     pub solid: Option<u32>,
     /// Whether a coincident triangle replaces it.
     pub is_hidden_duplicate: bool,
@@ -151,8 +151,8 @@ pub(crate) struct BakeScene {
 const MAX_TRIANGLES: usize = 1 << 28;
 
 impl BakeScene {
-    /// Builds the scene from the objects and their layout. `warnings` reports triangles that are left out or replaced, and
-    /// materials that are corrected.
+    /// Builds the scene from the objects and their layout. `warnings` reports triangles that are left out or replaced,
+    /// and materials that are corrected.
     pub fn new(
         objects: &[SceneObject],
         layout: &LightmapLayout,
@@ -212,7 +212,8 @@ fn extract_object(
     let (mut not_finite, mut without_area) = (0, 0);
     for ((primitive, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
         let surface = surfaces.len() as u32;
-        // A texture lowers its factor, so the factor alone says nothing; `SurfaceMaterial` clamps the product at each point.
+        // A texture lowers its factor, so the factor alone says nothing; `SurfaceMaterial` clamps the product at each
+        // point.
         let textured = primitive
             .textures
             .as_ref()
@@ -277,8 +278,8 @@ fn extract_object(
     }
 }
 
-/// The cofactor matrix of a linear map: it transforms normals correctly under any scale. Mirrored meshes get the reversed
-/// winding, and here the opposite sign, so that their fronts stay fronts.
+/// The cofactor matrix of a linear map: it transforms normals correctly under any scale. Mirrored meshes get the
+/// reversed winding, and here the opposite sign, so that their fronts stay fronts.
 fn normal_matrix(linear: DMat3, is_mirrored: bool) -> DMat3 {
     DMat3::from_cols(
         linear.y_axis.cross(linear.z_axis),
@@ -300,7 +301,8 @@ fn normal_and_area(corners: &[Vec3; 3]) -> Option<(Vec3, f32)> {
 /// A closed piece whose fronts face outward: its number and bounding box.
 type Solid = (u32, Vec3, Vec3);
 
-/// Marks the triangles of closed pieces in the object whose triangles begin at `first`, and appends its rooms and solids.
+/// Marks the triangles of closed pieces in the object whose triangles begin at `first`, and appends its rooms and
+/// solids.
 fn mark_closed(
     triangles: &mut [SceneTriangle],
     first: usize,

@@ -1,5 +1,5 @@
-//! Direct light of emissive triangles: Lambert's exact formula for the unoccluded light, times the visible fraction, which
-//! shadow rays or the exact clipping of occluders determine. Point lights are in `punctual`.
+//! Direct light of emissive triangles: Lambert's exact formula for the unoccluded light, times the visible fraction,
+//! which shadow rays or the exact clipping of occluders determine. Point lights are in `punctual`.
 
 use glam::Vec3;
 
@@ -33,21 +33,21 @@ const RETRY_FACTOR: u32 = 16;
 /// Shadow rays that cost about as much as computing a source's visible part exactly at one point.
 const RAYS_PER_EXACT_POINT: u32 = 8;
 
-/// Base of the dimension sets of all lamps but the first, which uses set 0. Lower sets belong to the samples that sources
-/// share.
+/// Base of the dimension sets of all lamps but the first, which uses set 0. Lower sets belong to the samples that
+/// sources share.
 const FIRST_SET: u32 = 34;
 
-/// The number of samples for a source that brings a `fraction` of the brightest source's light, where that gets `samples`. It
-/// is a power of two, for which batches are best distributed.
+/// The number of samples for a source that brings a `fraction` of the brightest source's light, where that gets
+/// `samples`. It is a power of two, for which batches are best distributed.
 fn samples_for(samples: u32, fraction: f32) -> u32 {
     let least = (samples / 4).max(BATCHES as u32).min(samples);
     ((samples as f32 * fraction) as u32).next_power_of_two().clamp(least, samples)
 }
 
 impl Sources<'_> {
-    /// E = Σ (mean of the exact unoccluded light) x (visible light / all light, by the same samples) over lamps. This is
-    /// exact where a lamp is fully visible or fully hidden; in between, its error is that of the visible fraction alone.
-    /// `nodes` are the lamps' nodes in the emitter tree; rays and variance are added to `direct`.
+    /// E = Σ (mean of the exact unoccluded light) x (visible light / all light, by the same samples) over lamps. This
+    /// is exact where a lamp is fully visible or fully hidden; in between, its error is that of the visible fraction
+    /// alone. `nodes` are the lamps' nodes in the emitter tree; rays and variance are added to `direct`.
     pub(crate) fn area_light_irradiance(
         &self,
         nodes: &[u32],
@@ -109,8 +109,9 @@ impl Sources<'_> {
         irradiance
     }
 
-    /// The mean light of a lamp whose possible occluders are known, and its variance, computed exactly at as many points as
-    /// cost about `samples` shadow rays. `None` if the occluders cut the lamp into too many pieces at some point.
+    /// The mean light of a lamp whose possible occluders are known, and its variance, computed exactly at as many
+    /// points as cost about `samples` shadow rays. `None` if the occluders cut the lamp into too many pieces at some
+    /// point.
     fn visible_past_occluders(
         &self,
         occluders: &LampOccluders,

@@ -1,4 +1,5 @@
-//! The direct light of a receiver, with its variance and a summary of which sources are visible. `irradiance` computes it.
+//! The direct light of a receiver, with its variance and a summary of which sources are visible. `irradiance` computes
+//! it.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -34,8 +35,8 @@ pub(crate) struct VisibilitySummary {
 }
 
 impl VisibilitySummary {
-    /// Adds how many samples found source `id` visible and how many found it hidden. A source that is fully visible, or does
-    /// not shine here, leaves no trace: which sources are sampled together differs from receiver to receiver.
+    /// Adds how many samples found source `id` visible and how many found it hidden. A source that is fully visible, or
+    /// does not shine here, leaves no trace: which sources are sampled together differs from receiver to receiver.
     pub(crate) fn add(&mut self, id: u32, visible: u32, hidden: u32) {
         self.partly |= visible > 0 && hidden > 0;
         if hidden > 0 && visible == 0 {

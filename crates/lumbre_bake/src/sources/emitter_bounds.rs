@@ -1,6 +1,6 @@
-//! Bounds of a group of emitters (position, emission directions, power), and from them an estimate of the light that the group
-//! brings to a receiver: for one group, or with SIMD for eight groups and the same bits. The hierarchy of groups is
-//! `emitter_tree`.
+//! Bounds of a group of emitters (position, emission directions, power), and from them an estimate of the light that
+//! the group brings to a receiver: for one group, or with SIMD for eight groups and the same bits. The hierarchy of
+//! groups is `emitter_tree`.
 
 use std::sync::LazyLock;
 
@@ -28,13 +28,14 @@ pub(crate) struct EmitterBounds {
 pub(crate) const MIN_COSINE: f32 = 0.02;
 
 impl EmitterBounds {
-    /// Estimates the irradiance, summed over the channels and positive, that the group brings to receivers within `reach` of
-    /// the given one.
+    /// Estimates the irradiance, summed over the channels and positive, that the group brings to receivers within
+    /// `reach` of the given one.
     pub fn weight(&self, receiver: &Receiver, reach: f32) -> f32 {
         let towards = self.center - receiver.position;
         let size = self.radius + reach;
         let squared = towards.length_squared() + size * size;
-        // Close to the group, this makes the direction shorter than a unit vector, but there `subtends` makes all of it count.
+        // Close to the group, this makes the direction shorter than a unit vector, but there `subtends` makes all of it
+        // count.
         let inverse = 1.0 / squared.sqrt();
         let subtends = size * inverse;
         let receives = (towards.dot(receiver.normal) * inverse + subtends).clamp(MIN_COSINE, 1.0);

@@ -1,5 +1,5 @@
-//! Samples a point on an emissive triangle: uniformly by area, or by solid angle where the triangle is near. `emitter_tree`
-//! chooses the triangle.
+//! Samples a point on an emissive triangle: uniformly by area, or by solid angle where the triangle is near.
+//! `emitter_tree` chooses the triangle.
 
 use glam::{DVec3, Vec3};
 
@@ -28,8 +28,8 @@ pub(crate) fn sample_emitter(
     if height <= 0.0 {
         return None;
     }
-    // Where the emitter is near, the contribution of its points varies strongly with their distance; sampling directions
-    // uniformly avoids that.
+    // Where the emitter is near, the contribution of its points varies strongly with their distance; sampling
+    // directions uniformly avoids that.
     let nearest = p.length_squared().min(q.length_squared()).min(r.length_squared());
     let by_direction = match emitter.area > WIDE * nearest.max(height * height) {
         true => spherical_triangle([p, q, r], u, v),
@@ -60,8 +60,9 @@ pub(crate) fn sample_emitter(
 /// Ratio of an emitter's area to its squared distance from which on it is sampled by solid angle.
 const WIDE: f32 = 0.05;
 
-/// A direction towards a triangle, distributed uniformly over its solid angle, and that angle, for (u, v) of the unit square
-/// (Arvo, "Stratified Sampling of Spherical Triangles", 1995). `None` if the triangle is too narrow for single precision.
+/// A direction towards a triangle, distributed uniformly over its solid angle, and that angle, for (u, v) of the unit
+/// square (Arvo, "Stratified Sampling of Spherical Triangles", 1995). `None` if the triangle is too narrow for single
+/// precision.
 fn spherical_triangle(corners: [Vec3; 3], u: f32, v: f32) -> Option<(Vec3, f32)> {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3().normalize_or_zero());
     let normal = |p: DVec3, q: DVec3| p.cross(q).try_normalize();

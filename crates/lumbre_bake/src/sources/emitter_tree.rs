@@ -1,8 +1,8 @@
-//! A hierarchy of the emissive triangles (after Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive
-//! Tree Splitting", 2018). The upper nodes group lamps (connected pieces), the lower nodes divide a lamp; each node stores
-//! bounds of its position, emission directions and power. The tree estimates the light of a node, computes its unoccluded
-//! light, and samples its emitters. Visibility is in `area_light`, and the choice of the nodes that are sampled individually
-//! in `light_cut`.
+//! A hierarchy of the emissive triangles (after Conty Estevez and Kulla, "Importance Sampling of Many Lights with
+//! Adaptive Tree Splitting", 2018). The upper nodes group lamps (connected pieces), the lower nodes divide a lamp; each
+//! node stores bounds of its position, emission directions and power. The tree estimates the light of a node, computes
+//! its unoccluded light, and samples its emitters. Visibility is in `area_light`, and the choice of the nodes that are
+//! sampled individually in `light_cut`.
 
 use std::f32::consts::PI;
 
@@ -46,14 +46,15 @@ struct Node {
 
 /// Nodes of up to this many emitters are summed exactly, emitter by emitter, at any distance.
 pub(crate) const EXACT_EMITTERS: u32 = 48;
-/// In larger nodes, descendants whose radius is less than this fraction of their distance are approximated by one term. For a
-/// node of radius r at distance d, the relative error is about (r/d)², here a quarter of a per cent, plus (r/d) times the
-/// difference of its normals.
+/// In larger nodes, descendants whose radius is less than this fraction of their distance are approximated by one term.
+/// For a node of radius r at distance d, the relative error is about (r/d)², here a quarter of a per cent, plus (r/d)
+/// times the difference of its normals.
 const OPENING: f32 = 0.05;
-/// A node that may partly face away is not opened further if it can bring no more than this fraction of the light summed so
-/// far.
+/// A node that may partly face away is not opened further if it can bring no more than this fraction of the light
+/// summed so far.
 const NEGLIGIBLE: f32 = 0.003;
-/// Relative RMS error of a lamp's light when its distant nodes are approximated by one term each, as a test measures it.
+/// Relative RMS error of a lamp's light when its distant nodes are approximated by one term each, as a test measures
+/// it.
 pub(crate) const TERM_ERROR: f32 = 0.005;
 
 /// Lamps whose common bounding sphere appears under at most this sine are treated as casting one shadow.
@@ -157,8 +158,8 @@ impl EmitterTree {
         apparent_sine(bounds.center, bounds.radius, receiver, reach)
     }
 
-    /// Estimates the unoccluded form factor from a receiver to all emitters together, from 0 to about 1. A distant node counts
-    /// as one area at its centre; near nodes are opened, and none counts for more than its bounding sphere.
+    /// Estimates the unoccluded form factor from a receiver to all emitters together, from 0 to about 1. A distant node
+    /// counts as one area at its centre; near nodes are opened, and none counts for more than its bounding sphere.
     pub fn form_factor(&self, receiver: &Receiver) -> f32 {
         let (mut sum, mut open, mut opened) = (0.0, Vec::new(), 0);
         open.extend(self.root());
@@ -183,8 +184,8 @@ impl EmitterTree {
         sum
     }
 
-    /// The lamps or groups of lamps, at most `most`, whose shadows are computed separately at a receiver. The brightest group
-    /// that is not [`NARROW`] is divided first.
+    /// The lamps or groups of lamps, at most `most`, whose shadows are computed separately at a receiver. The brightest
+    /// group that is not [`NARROW`] is divided first.
     pub fn groups(&self, receiver: &Receiver, most: usize) -> Vec<u32> {
         let mut groups: Vec<u32> = self.root().into_iter().collect();
         while groups.len() < most {

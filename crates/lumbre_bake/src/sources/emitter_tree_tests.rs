@@ -69,8 +69,8 @@ fn approximating_distant_nodes_by_one_term_is_close_to_the_exact_sum() {
         (worst, squares) = (worst.max(error), squares + error * error / 400.0);
     }
     println!("worst of 400: {:.4} %, RMS {:.4} %", 100.0 * worst, 100.0 * squares.sqrt());
-    // The error is a small multiple of (r/d)² = 0.0025; where the receiver's horizon or the lamp's cuts off most of the light,
-    // it is of the order of r/d itself.
+    // The error is a small multiple of (r/d)² = 0.0025; where the receiver's horizon or the lamp's cuts off most of the
+    // light, it is of the order of r/d itself.
     assert!(worst < 0.03 && squares.sqrt() < f64::from(TERM_ERROR), "{worst} {squares}");
 }
 

@@ -1,5 +1,5 @@
-//! Sampling an emitter by descending the hierarchy: each step chooses among up to eight nodes in proportion to their estimated
-//! light, so that ten thousand emitters are five steps away. The hierarchy itself is `emitter_tree`.
+//! Sampling an emitter by descending the hierarchy: each step chooses among up to eight nodes in proportion to their
+//! estimated light, so that ten thousand emitters are five steps away. The hierarchy itself is `emitter_tree`.
 
 use fearless_simd::{Simd, dispatch};
 
@@ -14,8 +14,8 @@ enum NextStep {
     Emitter(u32),
     /// It chooses among the nodes of a wide node, given by its index.
     Wide(u32),
-    /// It chooses between the node's two children. Such nodes are inside a wide node, so only a descent that starts there
-    /// reaches them.
+    /// It chooses between the node's two children. Such nodes are inside a wide node, so only a descent that starts
+    /// there reaches them.
     Halves([u32; 2]),
 }
 
@@ -88,8 +88,8 @@ impl EmitterWalk {
         walk
     }
 
-    /// Samples an emitter of a node by `u` in [0, 1), about in proportion to the light that it brings to the receiver. `bounds`
-    /// are those of the tree's nodes.
+    /// Samples an emitter of a node by `u` in [0, 1), about in proportion to the light that it brings to the receiver.
+    /// `bounds` are those of the tree's nodes.
     pub fn choose(&self, bounds: &[EmitterBounds], node: u32, receiver: &Receiver, u: f32) -> EmitterChoice {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         if let Some(simd) = LEVEL.as_avx2() {
@@ -133,8 +133,8 @@ impl EmitterWalk {
     }
 }
 
-/// Samples one of some weights by `u` in [0, 1): its index, its probability, and `u` rescaled from its interval to [0, 1). If
-/// the sum is zero or not finite, all have the same probability.
+/// Samples one of some weights by `u` in [0, 1): its index, its probability, and `u` rescaled from its interval to [0,
+/// 1). If the sum is zero or not finite, all have the same probability.
 #[inline(always)]
 fn pick(weights: &[f32], u: f32) -> (usize, f32, f32) {
     let sum: f32 = weights.iter().sum();

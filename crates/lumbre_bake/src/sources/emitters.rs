@@ -1,5 +1,5 @@
-//! Emissive triangles as light sources, each of uniform radiance. A triangle whose emission varies is divided into pieces.
-//! Their light is computed in `area_light` and `shared_samples`.
+//! Emissive triangles as light sources, each of uniform radiance. A triangle whose emission varies is divided into
+//! pieces. Their light is computed in `area_light` and `shared_samples`.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -35,8 +35,8 @@ impl Emitter {
     }
 }
 
-/// For each emitter the number of its lamp. A lamp is a connected set of emissive triangles: they are connected if they share
-/// a corner, bit for bit.
+/// For each emitter the number of its lamp. A lamp is a connected set of emissive triangles: they are connected if they
+/// share a corner, bit for bit.
 pub(crate) fn lamps(scene: &BakeScene, emitters: &[Emitter]) -> Vec<u32> {
     let mut corners: HashMap<[u32; 3], u32> = HashMap::new();
     let mut lamps = DisjointSets::default();

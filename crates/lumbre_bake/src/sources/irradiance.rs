@@ -1,5 +1,5 @@
-//! The direct light of a receiver from all sources: those that are sampled individually, each by itself, and the others by
-//! samples that they share. `light_cut` decides which are which.
+//! The direct light of a receiver from all sources: those that are sampled individually, each by itself, and the others
+//! by samples that they share. `light_cut` decides which are which.
 
 use super::direct::Direct;
 use super::light_cut::LightCut;
@@ -12,8 +12,9 @@ use crate::visibility::occluders::Visibility;
 const SHARED_SAMPLES_FACTOR: u32 = 4;
 
 impl Sources<'_> {
-    /// Mean irradiance of a receiver, by `samples` shadow rays to each source that matters and [`SHARED_SAMPLES_FACTOR`] times as many
-    /// to the others together. `point` maps the unit square onto the receiver's surface.
+    /// Mean irradiance of a receiver, by `samples` shadow rays to each source that matters and
+    /// [`SHARED_SAMPLES_FACTOR`] times as many to the others together. `point` maps the unit square onto the receiver's
+    /// surface.
     pub fn irradiance(
         &self,
         sequence: Sequence,
@@ -30,8 +31,8 @@ impl Sources<'_> {
         direct
     }
 
-    /// Mean irradiance by the sources that are sampled individually. For sources whose possible occluders `visibility` knows, it
-    /// casts no shadow rays, and visibility is exact at each of the receiver's points.
+    /// Mean irradiance by the sources that are sampled individually. For sources whose possible occluders `visibility`
+    /// knows, it casts no shadow rays, and visibility is exact at each of the receiver's points.
     pub fn irradiance_per_source(
         &self,
         cut: &LightCut,

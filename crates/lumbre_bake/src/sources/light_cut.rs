@@ -1,8 +1,8 @@
-//! Chooses which sources are sampled individually at a piece of surface, and the nodes from which the others are sampled: a cut
-//! through the trees of emitters and lights that opens the brightest nodes first (adaptive splitting: Conty Estevez and Kulla,
-//! "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018; Walter et al., "Lightcuts", 2005). The cost of a
-//! receiver thus depends on which sources matter there and not on how many there are. The light itself is computed in
-//! `area_light`, `punctual` and `shared_samples`.
+//! Chooses which sources are sampled individually at a piece of surface, and the nodes from which the others are
+//! sampled: a cut through the trees of emitters and lights that opens the brightest nodes first (adaptive splitting:
+//! Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018; Walter et al.,
+//! "Lightcuts", 2005). The cost of a receiver thus depends on which sources matter there and not on how many there are.
+//! The light itself is computed in `area_light`, `punctual` and `shared_samples`.
 
 use std::collections::BinaryHeap;
 
@@ -50,8 +50,8 @@ impl SharedSources {
 }
 
 impl Sources<'_> {
-    /// Samples a branch of the shared sources by `u` in [0, 1). Returns the branch, `u` rescaled from the branch's interval to
-    /// [0, 1), and the branch's probability.
+    /// Samples a branch of the shared sources by `u` in [0, 1). Returns the branch, `u` rescaled from the branch's
+    /// interval to [0, 1), and the branch's probability.
     pub(crate) fn pick_branch(
         &self,
         shared: &SharedSources,
@@ -88,7 +88,8 @@ impl Sources<'_> {
 }
 
 impl LightCut {
-    /// A hash of the individually sampled sources. Where it differs between receivers, so does the light of the shared sources.
+    /// A hash of the individually sampled sources. Where it differs between receivers, so does the light of the shared
+    /// sources.
     pub fn key(&self) -> u64 {
         let mut hasher = blake3::Hasher::new();
         for number in self.lamps.iter().chain(&[u32::MAX]).chain(&self.lights) {
@@ -99,15 +100,15 @@ impl LightCut {
     }
 }
 
-/// Up to this many lamps, all are sampled individually: their exact light, or their exact unoccluded light times the visible
-/// fraction, is less noisy than shared samples.
+/// Up to this many lamps, all are sampled individually: their exact light, or their exact unoccluded light times the
+/// visible fraction, is less noisy than shared samples.
 const FEW_LAMPS: u32 = 8;
 /// With more emitters than this in the scene, the lamps are never all sampled individually.
 const MAX_EMITTERS: u32 = 20_000;
 /// Where lamps are many, most emitters of a lamp that is sampled individually.
 pub(crate) const FEW_EMITTERS: u32 = 24;
-/// If the lamps' form factor from a receiver exceeds this, all lamps are sampled individually too, in groups: the sum over them is
-/// exact and little of it is hidden, while shared samples of near and large sources are noisy.
+/// If the lamps' form factor from a receiver exceeds this, all lamps are sampled individually too, in groups: the sum
+/// over them is exact and little of it is hidden, while shared samples of near and large sources are noisy.
 const ENCLOSED: f32 = 0.5;
 /// Most nodes into which all lamps are grouped when they are all sampled individually.
 const MAX_GROUPS: usize = 16;
@@ -119,8 +120,8 @@ const MAX_INDIVIDUAL: usize = 3;
 const OPENED: f32 = 0.02;
 /// Most nodes in a cut.
 const MAX_BRANCHES: usize = 32;
-/// Nodes whose bounding sphere appears under a larger sine than this are near. They have lower limits for opening, since it differs from
-/// receiver to receiver which of their sources matter.
+/// Nodes whose bounding sphere appears under a larger sine than this are near. They have lower limits for opening,
+/// since it differs from receiver to receiver which of their sources matter.
 const NEAR: f32 = 0.5;
 /// [`OPENED`] for near nodes.
 const OPENED_NEAR: f32 = 0.005;
@@ -150,8 +151,8 @@ impl PartialOrd for Weighted {
 }
 
 impl Sources<'_> {
-    /// The cut for all receivers within `reach` (canonical units) of the given one. The lamps in `shared` share samples, however
-    /// bright they are.
+    /// The cut for all receivers within `reach` (canonical units) of the given one. The lamps in `shared` share
+    /// samples, however bright they are.
     pub fn cut(&self, receiver: &Receiver, reach: f32, shared: &[u32]) -> LightCut {
         let mut cut = LightCut { lights: self.individually_sampled_lights.clone(), ..LightCut::default() };
         let mut roots = Vec::new();
@@ -217,7 +218,8 @@ impl Sources<'_> {
         cut
     }
 
-    /// The nodes of all lamps, if those are to be sampled individually: if they are few, or fill most of what the receiver sees.
+    /// The nodes of all lamps, if those are to be sampled individually: if they are few, or fill most of what the
+    /// receiver sees.
     fn few_lamps(&self, receiver: &Receiver) -> Option<Vec<u32>> {
         let tree = &self.emitter_tree;
         let Some(root) = tree.root() else { return Some(Vec::new()) };

@@ -1,5 +1,5 @@
-//! All light sources of a scene: emissive triangles and punctual lights, each in a tree, and the sky. The light that they bring
-//! to a receiver is computed in `irradiance`.
+//! All light sources of a scene: emissive triangles and punctual lights, each in a tree, and the sky. The light that
+//! they bring to a receiver is computed in `irradiance`.
 
 use std::f32::consts::PI;
 
@@ -18,15 +18,16 @@ pub(crate) struct Sources<'a> {
     pub(crate) emitter_tree: EmitterTree,
     pub lights: Vec<PlacedLight>,
     pub(crate) light_tree: LightTree,
-    /// Indices of the lights that are sampled individually everywhere: directional lights, and all lights if they are few.
+    /// Indices of the lights that are sampled individually everywhere: directional lights, and all lights if they are
+    /// few.
     pub(crate) individually_sampled_lights: Vec<u32>,
-    /// Irradiance of a surface under an unoccluded sky: π times the sky's radiance, W/m². The sky is not part of direct light:
-    /// rays of the form factors and of the final gather receive it where they hit nothing.
+    /// Irradiance of a surface under an unoccluded sky: π times the sky's radiance, W/m². The sky is not part of direct
+    /// light: rays of the form factors and of the final gather receive it where they hit nothing.
     pub sky: Vec3,
 }
 
-/// Up to this many lights, all are sampled individually: the exact sum over them times the visible fraction is less noisy than
-/// shared samples.
+/// Up to this many lights, all are sampled individually: the exact sum over them times the visible fraction is less
+/// noisy than shared samples.
 pub(crate) const FEW_LIGHTS: usize = 16;
 
 impl<'a> Sources<'a> {

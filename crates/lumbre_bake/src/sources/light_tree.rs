@@ -1,6 +1,7 @@
-//! A hierarchy of the point and spot lights (after Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive
-//! Tree Splitting", 2018). Each node stores bounds of position, range, emission directions and power; the tree estimates the
-//! light of a node and samples its lights. Directional lights have no position and stay out; visibility is in `punctual`.
+//! A hierarchy of the point and spot lights (after Conty Estevez and Kulla, "Importance Sampling of Many Lights with
+//! Adaptive Tree Splitting", 2018). Each node stores bounds of position, range, emission directions and power; the tree
+//! estimates the light of a node and samples its lights. Directional lights have no position and stay out; visibility
+//! is in `punctual`.
 
 use std::f32::consts::PI;
 
@@ -38,8 +39,8 @@ struct Node {
     kind: NodeKind,
 }
 
-/// Factor on the weight of a node outside of its lights' cones, and lower bound of the factor near the end of their range: the
-/// bounds of a group are not exact, so that some light may arrive nevertheless.
+/// Factor on the weight of a node outside of its lights' cones, and lower bound of the factor near the end of their
+/// range: the bounds of a group are not exact, so that some light may arrive nevertheless.
 const OUTSIDE: f32 = 0.01;
 
 impl LightTree {
@@ -84,8 +85,9 @@ impl LightTree {
         apparent_sine(node.center, node.radius, receiver, reach)
     }
 
-    /// Samples a light of a node by `u` in [0, 1), about in proportion to the light that it brings to the receiver; also returns
-    /// its probability. `None` if the descent reaches a node none of whose lights reaches as far as the receiver.
+    /// Samples a light of a node by `u` in [0, 1), about in proportion to the light that it brings to the receiver;
+    /// also returns its probability. `None` if the descent reaches a node none of whose lights reaches as far as the
+    /// receiver.
     pub fn pick(&self, index: u32, receiver: &Receiver, mut u: f32) -> Option<(u32, f32)> {
         let (mut index, mut probability) = (index, 1.0f32);
         loop {
@@ -104,8 +106,8 @@ impl LightTree {
         }
     }
 
-    /// Estimates the irradiance, summed over the channels, that a node brings to receivers within `reach` of the given one. It is
-    /// 0 only if no light of the node arrives at any of them.
+    /// Estimates the irradiance, summed over the channels, that a node brings to receivers within `reach` of the given
+    /// one. It is 0 only if no light of the node arrives at any of them.
     pub fn weight(&self, index: u32, receiver: &Receiver, reach: f32) -> f32 {
         let node = &self.nodes[index as usize];
         let towards = node.center - receiver.position;
@@ -120,7 +122,8 @@ impl LightTree {
         let receives = (direction.dot(receiver.normal) + subtends).clamp(MIN_COSINE, 1.0);
         let [constant, linear, quadratic] = node.attenuation;
         let divisor = constant + linear * distance + quadratic * squared;
-        // A sine is less than its angle, so this test is slightly too narrow; lights that it misses still count by `OUTSIDE`.
+        // A sine is less than its angle, so this test is slightly too narrow; lights that it misses still count by
+        // `OUTSIDE`.
         let is_inside = node.cosine <= -1.0 || node.cosine - 1.5 * subtends <= -direction.dot(node.axis);
         // The attenuation window that closes at the range, for the nearest point of the bounding sphere.
         let window = 1.0 - ((distance - size).max(0.0) / node.range).powi(4);

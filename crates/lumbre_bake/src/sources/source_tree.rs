@@ -1,5 +1,5 @@
-//! What the tree of emitters and the tree of punctual lights have in common: the kinds of nodes, the split of a node in two,
-//! and the apparent size of a node's bounding sphere. The trees themselves are `emitter_tree` and `light_tree`.
+//! What the tree of emitters and the tree of punctual lights have in common: the kinds of nodes, the split of a node in
+//! two, and the apparent size of a node's bounding sphere. The trees themselves are `emitter_tree` and `light_tree`.
 
 use glam::Vec3;
 
@@ -29,7 +29,8 @@ pub(crate) fn split_at_median(sources: &mut [u32], position: impl Fn(&u32) -> Ve
     sources.len() / 2
 }
 
-/// The sine of the angular radius at which a sphere, enlarged by `reach`, appears from a receiver; 1 from inside the sphere.
+/// The sine of the angular radius at which a sphere, enlarged by `reach`, appears from a receiver; 1 from inside the
+/// sphere.
 pub(crate) fn apparent_sine(center: Vec3, radius: f32, receiver: &Receiver, reach: f32) -> f32 {
     let distance = center.distance(receiver.position);
     let size = radius + reach;
