@@ -2,6 +2,7 @@
 //! largest coordinate is in [1, 2). A scene scaled by 2^k is then baked with exactly the same numbers.
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
+use lumbre_mesh::TriangleMesh;
 use lumbre_rays::{Bvh, triangle_extent};
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +13,7 @@ use super::leaks::Leaks;
 use super::material::{LARGEST_REFLECTANCE, Side};
 use super::rooms::{Room, all_within, pieces};
 use super::texture_coordinates::textures_of;
-use super::{LightmapLayout, SceneObject, SurfaceMaterial};
+use super::{LightmapLayout, PlacedPrimitive, SceneObject, SurfaceMaterial, world_points};
 use crate::BakeError;
 use crate::cancel_token::CancelToken;
 
@@ -209,7 +210,7 @@ fn extract_object(
 ) {
     let map = &layout.maps[index as usize];
     let size = Vec2::new(map.width as f32, map.height as f32);
-    let (mut not_finite, mut without_area) = (0, 0);
+    let mut left_out = LeftOut::default();
     for ((primitive, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
         let surface = surfaces.len() as u32;
         // A texture lowers its factor, so the factor alone says nothing; `SurfaceMaterial` clamps the product at each
@@ -224,49 +225,9 @@ fn extract_object(
             textures: textures_of(primitive, moved),
             mesh: mesh.clone(),
         });
-        let positions: Vec<Vec3> = mesh
-            .positions
-            .iter()
-            .map(|p| space.position(primitive.transform.transform_point3(p.as_dvec3())))
-            .collect();
-        let linear = primitive.transform.matrix3;
-        let is_mirrored = linear.determinant() < 0.0;
-        let cofactor = normal_matrix(linear, is_mirrored);
-        for [a, b, c] in mesh.triangles() {
-            let vertices = if is_mirrored { [a, c, b] } else { [a, b, c] };
-            let corners = vertices.map(|vertex| positions[vertex as usize]);
-            if !corners.iter().all(|corner| corner.is_finite()) {
-                not_finite += 1;
-                continue;
-            }
-            let Some((normal, area)) = normal_and_area(&corners) else {
-                without_area += 1;
-                continue;
-            };
-            let normals = vertices.map(|vertex| {
-                let mesh_normal = mesh.normals.get(vertex as usize).copied().unwrap_or(Vec3::ZERO);
-                let shading = (cofactor * mesh_normal.as_dvec3()).normalize_or_zero().as_vec3();
-                // The geometric normal replaces one that is zero, NaN or turned too far away from it.
-                if shading.is_finite() && shading.dot(normal) > 0.1 { shading } else { normal }
-            });
-            triangles.push(SceneTriangle {
-                corners,
-                normal,
-                area,
-                extent: triangle_extent(&corners),
-                flat: normals.iter().all(|shading| shading.dot(normal) > 0.9999),
-                normals,
-                uv: vertices.map(|vertex| mesh.uv1.get(vertex as usize).copied().unwrap_or_default() * size),
-                surface,
-                object: index,
-                vertices,
-                two_sided: primitive.material.double_sided,
-                closed: false,
-                solid: None,
-                is_hidden_duplicate: false,
-            });
-        }
+        extract_triangles(primitive, mesh, space, size, (surface, index), triangles, &mut left_out);
     }
+    let LeftOut { not_finite, without_area } = left_out;
     if not_finite > 0 {
         warnings.push(format!(
             "{}: {not_finite} triangles with NaN or infinite positions were left out",
@@ -275,6 +236,64 @@ fn extract_object(
     }
     if without_area > 0 {
         warnings.push(format!("{}: {without_area} triangles without area were left out", object.name));
+    }
+}
+
+/// Numbers of triangles that are left out of the scene.
+#[derive(Default)]
+struct LeftOut {
+    not_finite: usize,
+    without_area: usize,
+}
+
+/// Appends the triangles of a primitive, which has the indices `surface` and `object`, on a map of `size` texels.
+fn extract_triangles(
+    primitive: &PlacedPrimitive,
+    mesh: &TriangleMesh,
+    space: Canonical,
+    size: Vec2,
+    (surface, object): (u32, u32),
+    triangles: &mut Vec<SceneTriangle>,
+    left_out: &mut LeftOut,
+) {
+    let positions: Vec<Vec3> =
+        world_points(&primitive.transform, mesh).map(|point| space.position(point)).collect();
+    let linear = primitive.transform.matrix3;
+    let is_mirrored = linear.determinant() < 0.0;
+    let cofactor = normal_matrix(linear, is_mirrored);
+    for [a, b, c] in mesh.triangles() {
+        let vertices = if is_mirrored { [a, c, b] } else { [a, b, c] };
+        let corners = vertices.map(|vertex| positions[vertex as usize]);
+        if !corners.iter().all(|corner| corner.is_finite()) {
+            left_out.not_finite += 1;
+            continue;
+        }
+        let Some((normal, area)) = normal_and_area(&corners) else {
+            left_out.without_area += 1;
+            continue;
+        };
+        let normals = vertices.map(|vertex| {
+            let mesh_normal = mesh.normals.get(vertex as usize).copied().unwrap_or(Vec3::ZERO);
+            let shading = (cofactor * mesh_normal.as_dvec3()).normalize_or_zero().as_vec3();
+            // The geometric normal replaces one that is zero, NaN or turned too far away from it.
+            if shading.is_finite() && shading.dot(normal) > 0.1 { shading } else { normal }
+        });
+        triangles.push(SceneTriangle {
+            corners,
+            normal,
+            area,
+            extent: triangle_extent(&corners),
+            flat: normals.iter().all(|shading| shading.dot(normal) > 0.9999),
+            normals,
+            uv: vertices.map(|vertex| mesh.uv1.get(vertex as usize).copied().unwrap_or_default() * size),
+            surface,
+            object,
+            vertices,
+            two_sided: primitive.material.double_sided,
+            closed: false,
+            solid: None,
+            is_hidden_duplicate: false,
+        });
     }
 }
 
