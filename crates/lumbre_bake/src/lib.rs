@@ -47,6 +47,7 @@ mod bake;
 mod cancel_token;
 mod checkpoint;
 mod chunks;
+mod color;
 mod conjugate_gradients;
 mod content_hash;
 mod coverage;

@@ -132,7 +132,7 @@ impl<'a> Shafts<'a> {
             // Where all lamps have samples of their own, the unoccluded sum over them is exact and rays only find the
             // visible share of it.
             let cut = cuts.of(texel as usize);
-            for &lamp in cut.lamps.iter().filter(|_| !cut.all_apart) {
+            for &lamp in cut.lamps.iter().filter(|_| !cut.has_all_lamps) {
                 if tile.lamps.iter().all(|occluders| occluders.node != lamp) {
                     unresolved.entry((block, lamp)).or_insert((texel, 0)).1 += 1;
                 }

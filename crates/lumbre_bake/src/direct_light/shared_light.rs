@@ -83,7 +83,7 @@ impl SampleSums {
                 *sum += light.baked;
                 self.mixed += light.mixed;
                 self.inverse_distances += light.inverse_distance;
-                self.rays += u32::from(light.asked);
+                self.rays += u32::from(light.has_ray);
             }
         }
         self.samples = self.samples.max(samples);

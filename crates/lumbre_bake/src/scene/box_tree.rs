@@ -1,19 +1,21 @@
-//! Which triangles lie near a place: a binary tree of boxes. Not for rays, which have a hierarchy of their own.
+//! A binary tree of bounding boxes that finds the triangles near a place. Rays use a hierarchy of their own
+//! (`lumbre_rays::Bvh`).
 
 use glam::Vec3;
 
 use crate::cancel_token::CancelToken;
 
-/// Triangles of a leaf.
-const LEAF: usize = 4;
+/// Most triangles in a leaf.
+const MAX_LEAF_TRIANGLES: usize = 4;
 
 #[derive(Debug)]
 struct Node {
     low: Vec3,
     high: Vec3,
-    /// A leaf's items, or an inner node's second child; its first follows it.
+    /// Of a leaf, the index of its first item; of an inner node, the index of its second child (the first child
+    /// directly follows the node).
     first: u32,
-    /// 0 for an inner node.
+    /// The number of items in a leaf; 0 for an inner node.
     count: u32,
 }
 
@@ -25,11 +27,12 @@ pub(crate) struct BoxTree {
 }
 
 impl BoxTree {
-    /// Of triangles by their corners; those whose corners are NaN are left out, and the others keep their numbers.
+    /// Builds the tree over triangles given by their corners. Triangles whose first corner is NaN are left out; the
+    /// others keep their indices.
     pub fn new(triangles: &[[Vec3; 3]], stop: &CancelToken) -> Self {
         let mut items: Vec<u32> =
             (0..triangles.len() as u32).filter(|&index| !triangles[index as usize][0].is_nan()).collect();
-        let mut nodes = Vec::with_capacity(2 * items.len() / LEAF + 1);
+        let mut nodes = Vec::with_capacity(2 * items.len() / MAX_LEAF_TRIANGLES + 1);
         if !items.is_empty() {
             let end = items.len();
             build((triangles, stop), &mut items, 0, end, &mut nodes);
@@ -37,7 +40,8 @@ impl BoxTree {
         Self { nodes, items }
     }
 
-    /// Calls `visit` for every triangle whose box may meet the one from `low` to `high`, in an order that depends on the scene alone.
+    /// Calls `visit` for every triangle that may overlap the box from `low` to `high` (all triangles of each leaf that
+    /// overlaps it). The order depends on the scene alone.
     pub fn near(&self, low: Vec3, high: Vec3, mut visit: impl FnMut(u32)) {
         self.near_while(low, high, |index| {
             visit(index);
@@ -45,7 +49,7 @@ impl BoxTree {
         });
     }
 
-    /// As [`near`](Self::near), as long as `visit` wants more; whether it always did.
+    /// Like [`near`](Self::near), but stops as soon as `visit` returns `false`. Returns whether it visited all of them.
     pub fn near_while(&self, low: Vec3, high: Vec3, mut visit: impl FnMut(u32) -> bool) -> bool {
         if self.nodes.is_empty() {
             return true;
@@ -69,7 +73,7 @@ impl BoxTree {
     }
 }
 
-/// Halves by the median along the longest axis.
+/// Builds the subtree over `items[first..end]`, split at the median along the longest axis of its box.
 fn build(
     (triangles, stop): (&[[Vec3; 3]], &CancelToken),
     items: &mut [u32],
@@ -82,14 +86,15 @@ fn build(
         (low, high) = (low.min(corner), high.max(corner));
     }
     let (index, count) = (nodes.len(), end - first);
-    let is_leaf = count <= LEAF || stop.is_cancelled();
+    let is_leaf = count <= MAX_LEAF_TRIANGLES || stop.is_cancelled();
     nodes.push(Node { low, high, first: first as u32, count: if is_leaf { count as u32 } else { 0 } });
     if is_leaf {
         return;
     }
     let axis = (high - low).max_position();
-    let middle = |&index: &u32| triangles[index as usize].iter().map(|corner| corner[axis]).sum::<f32>();
-    items[first..end].sort_by(|a, b| middle(a).total_cmp(&middle(b)).then(a.cmp(b)));
+    // Three times the centroid's coordinate, which sorts as the centroid does.
+    let position = |&index: &u32| triangles[index as usize].iter().map(|corner| corner[axis]).sum::<f32>();
+    items[first..end].sort_by(|a, b| position(a).total_cmp(&position(b)).then(a.cmp(b)));
     let half = first + count / 2;
     build((triangles, stop), items, first, half, nodes);
     nodes[index].first = nodes.len() as u32;

@@ -1,4 +1,5 @@
-//! Everything that a line crosses, in order, and what it looks like from either side. Not a ray's first hit: that is `occlusion`.
+//! All surfaces that a line crosses, in order, and what each shows towards either end of the line. `occlusion` finds
+//! only the first hit of a ray.
 
 use std::cell::RefCell;
 
@@ -9,65 +10,68 @@ use super::BakeScene;
 use super::material::Side;
 use super::occlusion::SAME_PLACE;
 
-/// What stands at a place of a line, seen along it one way.
+/// What a crossing shows to one of the two directions along the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Face {
-    /// A side that takes part in the exchange of light.
+    /// A side of a triangle that receives and reflects light.
     Lit {
         triangle: u32,
         side: Side,
         /// Barycentric weights of the second and third vertex.
         at: (f32, f32),
     },
-    /// The back of a single-sided open surface: black.
+    /// The back of a single-sided open surface, which is black.
     Back,
-    /// The inside of a closed piece.
+    /// The inside of a closed mesh.
     Inside,
 }
 
-/// A place where a line crosses surfaces: one, or several that lie in the same place.
+/// A place where a line crosses one surface, or several coincident ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Crossing {
-    /// VisibilitySummary from before, in the line's direction.
+    /// What is seen from before the crossing, looking along the line's direction.
     pub before: Face,
-    /// VisibilitySummary from beyond, against the line's direction.
+    /// What is seen from beyond the crossing, looking against the line's direction.
     pub beyond: Face,
 }
 
-/// One triangle that the line meets.
+/// One triangle that the line hits.
 #[derive(Clone, Copy, Debug)]
-struct Meeting {
+struct LineHit {
+    /// Distance along the line.
     along: f32,
     triangle: u32,
     at: (f32, f32),
-    /// Of the line with the front's normal.
+    /// Cosine between the line's direction and the normal of the triangle's front.
     cosine: f32,
 }
 
 impl BakeScene {
-    /// All crossings of a line from `origin` (before everything) in a direction of unit length, in order; `reach` is how far from the origin
-    /// of the coordinates things are, canonical units.
+    /// All crossings of a line, in order. `origin` must lie before the whole scene and `direction` must be a unit
+    /// vector; `reach` is the largest distance from the coordinate origin, which sets the rounding tolerance, in
+    /// canonical units.
     pub fn crossings(&self, origin: Vec3, direction: Vec3, reach: f32) -> Vec<Crossing> {
-        let met = RefCell::new(Vec::new());
-        // A hierarchy that accepts no hit goes on to the line's end: one traversal meets them all.
-        let refuse = |triangle: u32, u: f32, v: f32| {
+        let hits = RefCell::new(Vec::new());
+        // A traversal in which every hit is rejected continues to the end of the line, so one traversal finds all hits.
+        let collect_hit = |triangle: u32, u: f32, v: f32| {
             if !self.masked || self.is_solid(triangle, u, v) {
-                let own = &self.triangles[triangle as usize];
-                let along = (own.position(u, v) - origin).dot(direction);
-                let cosine = own.normal.dot(direction);
-                met.borrow_mut().push(Meeting { along, triangle, at: (u, v), cosine });
+                let hit = &self.triangles[triangle as usize];
+                let along = (hit.position(u, v) - origin).dot(direction);
+                let cosine = hit.normal.dot(direction);
+                hits.borrow_mut().push(LineHit { along, triangle, at: (u, v), cosine });
             }
             false
         };
-        self.bvh.closest_hit_filtered(&Ray::new(origin, direction), refuse);
-        let mut met = met.into_inner();
-        met.sort_unstable_by(|a, b| a.along.total_cmp(&b.along).then(a.triangle.cmp(&b.triangle)));
+        self.bvh.closest_hit_filtered(&Ray::new(origin, direction), collect_hit);
+        let mut hits = hits.into_inner();
+        hits.sort_unstable_by(|a, b| a.along.total_cmp(&b.along).then(a.triangle.cmp(&b.triangle)));
         let slack = SAME_PLACE * reach;
-        // How far apart along their normals they are; what a plane's place is off by, a grazing line meets further along.
-        let together = |a: &Meeting, b: &Meeting| {
+        // Compares distances along the normal: on a grazing line, an error in a plane's position moves the hit much
+        // further along the line.
+        let is_same_place = |a: &LineHit, b: &LineHit| {
             (b.along - a.along) * a.cosine.abs().min(b.cosine.abs()).max(1.0 / 1024.0) <= slack
         };
-        met.chunk_by(together)
+        hits.chunk_by(is_same_place)
             .map(|place| Crossing {
                 before: self.face(place.iter(), -1.0),
                 beyond: self.face(place.iter().rev(), 1.0),
@@ -75,28 +79,26 @@ impl BakeScene {
             .collect()
     }
 
-    /// Of what lies in one place, in the order in which it is met, the first that looks the way that `sign` says; a black one if none does,
-    /// or if that way lies the inside of a solid.
-    fn face<'a>(&self, place: impl Iterator<Item = &'a Meeting> + Clone, sign: f32) -> Face {
-        let solid = |meeting: &Meeting| self.triangles[meeting.triangle as usize].solid;
-        // Its backs there, but none of its fronts: it has some thickness.
-        let is_inside = |meeting: &Meeting| {
-            let own = solid(meeting);
-            let shows = |other: &Meeting| solid(other) == own && other.cosine * sign > 0.0;
-            own.is_some() && meeting.cosine * sign < 0.0 && !place.clone().any(shows)
+    /// What coincident triangles, in the order in which a viewer reaches them, show to that viewer. A triangle's front
+    /// faces the viewer if its cosine has the sign `sign`. The result is the first lit side, or a black face if no side
+    /// is lit or if the viewer is inside a solid.
+    fn face<'a>(&self, place: impl Iterator<Item = &'a LineHit> + Clone, sign: f32) -> Face {
+        let solid = |hit: &LineHit| self.triangles[hit.triangle as usize].solid;
+        // The viewer is inside a solid if it sees the solid's backs here but none of its fronts; with both, the solid
+        // has no thickness here.
+        let is_inside = |hit: &LineHit| {
+            let hit_solid = solid(hit);
+            let is_front = |other: &LineHit| solid(other) == hit_solid && other.cosine * sign > 0.0;
+            hit_solid.is_some() && hit.cosine * sign < 0.0 && !place.clone().any(is_front)
         };
         if place.clone().any(is_inside) {
             return Face::Inside;
         }
-        let lit = place.clone().find_map(|meeting| {
-            let triangle = &self.triangles[meeting.triangle as usize];
-            let front = meeting.cosine * sign > 0.0;
+        let lit = place.clone().find_map(|hit| {
+            let triangle = &self.triangles[hit.triangle as usize];
+            let front = hit.cosine * sign > 0.0;
             let side = if front { Side::Front } else { Side::Back };
-            (front || triangle.two_sided).then_some(Face::Lit {
-                triangle: meeting.triangle,
-                side,
-                at: meeting.at,
-            })
+            (front || triangle.two_sided).then_some(Face::Lit { triangle: hit.triangle, side, at: hit.at })
         });
         let mut place = place;
         lit.unwrap_or_else(|| match place.next() {

@@ -1,17 +1,18 @@
-//! Triangles that lie exactly on another, turned the same way: light must meet one of them. The emitter wins, else the
-//! first. Triangles turned the other way are the two faces of a sheet and both stay.
+//! Finds triangles that coincide exactly with another of the same orientation, so that light interacts with only one of
+//! them: the emitter if one emits, else the first. Triangles of opposite orientation are the two faces of a sheet, and
+//! both stay.
 
 use std::collections::HashMap;
 
 use glam::Vec3;
 
-/// For each triangle, whether another in the same place takes its light. `emits` says which of them shine.
+/// For each triangle, whether a coincident one replaces it. `emits` says which triangles emit light.
 pub(crate) fn is_hidden_duplicate(triangles: &[[Vec3; 3]], emits: &[bool]) -> Vec<bool> {
     let mut first: HashMap<[[u32; 3]; 3], usize> = HashMap::with_capacity(triangles.len());
     let mut is_hidden_duplicate = vec![false; triangles.len()];
     for (index, triangle) in triangles.iter().enumerate() {
         let keys = triangle.map(|position| (position + Vec3::ZERO).to_array().map(f32::to_bits));
-        // Rotated so that the smallest comes first: the winding stays.
+        // Rotating the corners so that the smallest comes first keeps the winding. (Adding zero makes -0 and 0 equal.)
         let smallest = (0..3).min_by_key(|&i| keys[i]).unwrap_or(0);
         let key = [keys[smallest], keys[(smallest + 1) % 3], keys[(smallest + 2) % 3]];
         match first.get(&key).copied() {

@@ -1,4 +1,5 @@
-//! Reads a World: static meshes, grouped into objects of one lightmap each, the lights that are baked, and where something moves.
+//! Reads a World into a [`StaticScene`]: static meshes grouped into objects of one lightmap each, the lights to bake,
+//! and the places of dynamic objects.
 
 use std::collections::BTreeMap;
 
@@ -14,12 +15,12 @@ use lumbre_scene::{
 use super::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, world_points};
 use crate::UnwrappedFrom;
 
-/// The entities behind a scene: of each object, those of its primitives.
+/// The entities behind a scene: for each object, those of its primitives.
 pub(crate) type Entities = Vec<Vec<Entity>>;
 
-/// Reads the World, whose global transforms are brought up to date.
+/// Updates the World's global transforms and reads the scene.
 pub(crate) fn from_world(world: &mut World) -> (StaticScene, Entities) {
-    // The only way to fail is a system that cannot run; the transforms are then as the caller left them.
+    // This fails only if the system cannot run; the transforms then stay as the caller left them.
     if world.run_system_once(propagate_transforms).is_err() {
         tracing::warn!("transforms could not be propagated; baking with those found");
     }
@@ -28,15 +29,15 @@ pub(crate) fn from_world(world: &mut World) -> (StaticScene, Entities) {
     (StaticScene { objects, lights: lights(world), sky, moving: moving(world) }, entities)
 }
 
-/// The static objects, in an order that depends on the entities only.
+/// The static objects, in an order that depends on the entities alone.
 fn objects(world: &mut World) -> (Vec<SceneObject>, Entities) {
-    struct Part {
+    struct FoundPrimitive {
         index: usize,
         entity: Entity,
         primitive: PlacedPrimitive,
         scale: Option<f64>,
     }
-    let mut parts: BTreeMap<Entity, Vec<Part>> = BTreeMap::new();
+    let mut by_owner: BTreeMap<Entity, Vec<FoundPrimitive>> = BTreeMap::new();
     let hidden = hidden_entities(world);
     let mut query = world.query_filtered::<(
         Entity,
@@ -57,7 +58,7 @@ fn objects(world: &mut World) -> (Vec<SceneObject>, Entities) {
         (lights_frames, scale),
     ) in query.iter(world)
     {
-        if hidden.contains(&entity) || under_a_dynamic_object(world, parent) {
+        if hidden.contains(&entity) || has_dynamic_ancestor(world, parent) {
             continue;
         }
         let (mesh, textures) = UnwrappedFrom::read(unwrapped, mesh, textures);
@@ -69,43 +70,43 @@ fn objects(world: &mut World) -> (Vec<SceneObject>, Entities) {
         let primitive =
             PlacedPrimitive { mesh, material: material.clone(), textures, transform, lights_frames };
         let scale = scale.map(|scale| scale.0);
-        parts.entry(owner).or_default().push(Part { index, entity, primitive, scale });
+        by_owner.entry(owner).or_default().push(FoundPrimitive { index, entity, primitive, scale });
     }
-    let of_owner = |(owner, mut parts): (Entity, Vec<Part>)| {
-        parts.sort_by_key(|part| (part.index, part.entity));
+    let to_object = |(owner, mut found): (Entity, Vec<FoundPrimitive>)| {
+        found.sort_by_key(|primitive| (primitive.index, primitive.entity));
         let name =
             world.get::<Name>(owner).map_or_else(|| format!("object {owner}"), |name| name.to_string());
-        // One map has one density: the largest that is asked for. What is no number is no order either, and is refused later.
-        let scale = parts.iter().filter_map(|part| part.scale).max_by(f64::total_cmp);
-        let entities = parts.iter().map(|part| part.entity).collect();
-        let primitives = parts.into_iter().map(|part| part.primitive).collect();
+        // A map has one density: the largest that any primitive requests. `StaticScene::checked` rejects NaN later.
+        let scale = found.iter().filter_map(|primitive| primitive.scale).max_by(f64::total_cmp);
+        let entities = found.iter().map(|primitive| primitive.entity).collect();
+        let primitives = found.into_iter().map(|found| found.primitive).collect();
         (SceneObject { name, primitives, lightmap_scale: scale.unwrap_or(1.0) }, entities)
     };
-    parts.into_iter().map(of_owner).unzip()
+    by_owner.into_iter().map(to_object).unzip()
 }
 
-/// The lights that are baked whole or for their bounces, in the order of their entities.
+/// The lights that are baked, fully or for their bounces only, in the order of their entities.
 fn lights(world: &mut World) -> Vec<PlacedLight> {
     let mut query = world.query::<(Entity, &Light, Option<&GlobalTransform>)>();
     let baked = query.iter(world).filter(|(_, light, _)| PlacedLight::is_baked(light));
-    let mut found: Vec<_> = baked
+    let mut lights: Vec<_> = baked
         .map(|(entity, light, transform)| {
             let transform = transform.copied().unwrap_or_default();
             let (position, axis) = (transform.translation(), transform.forward());
             (entity, PlacedLight { light: light.clone(), position, axis })
         })
         .collect();
-    found.sort_by_key(|(entity, _)| *entity);
-    found.into_iter().map(|(_, light)| light).collect()
+    lights.sort_by_key(|(entity, _)| *entity);
+    lights.into_iter().map(|(_, light)| light).collect()
 }
 
-/// The corners of what moves, if anything does.
+/// The vertices of everything that moves, or `None` if nothing does.
 fn moving(world: &mut World) -> Option<Vec<DVec3>> {
     let hidden = hidden_entities(world);
     let mut query =
         world.query::<(Entity, &Mesh, Option<&GlobalTransform>, Has<DynamicObject>, Option<&ChildOf>)>();
     let shown = query.iter(world).filter(|object| !hidden.contains(&object.0));
-    let moving = shown.filter(|(.., dynamic, parent)| *dynamic || under_a_dynamic_object(world, *parent));
+    let moving = shown.filter(|(.., dynamic, parent)| *dynamic || has_dynamic_ancestor(world, *parent));
     moving.fold(None, |points, (_, mesh, transform, ..)| {
         let mut points = points.unwrap_or_default();
         points.extend(world_points(&transform.copied().unwrap_or_default().0, &mesh.0));
@@ -113,14 +114,14 @@ fn moving(world: &mut World) -> Option<Vec<DVec3>> {
     })
 }
 
-/// Whether something moves with what is above it.
-fn under_a_dynamic_object(world: &World, parent: Option<&ChildOf>) -> bool {
-    let mut above = parent.map(ChildOf::parent);
-    while let Some(entity) = above {
+/// Whether `parent` or one of its ancestors is a dynamic object, so that its descendants move with it.
+fn has_dynamic_ancestor(world: &World, parent: Option<&ChildOf>) -> bool {
+    let mut ancestor = parent.map(ChildOf::parent);
+    while let Some(entity) = ancestor {
         if world.get::<DynamicObject>(entity).is_some() {
             return true;
         }
-        above = world.get::<ChildOf>(entity).map(ChildOf::parent);
+        ancestor = world.get::<ChildOf>(entity).map(ChildOf::parent);
     }
     false
 }

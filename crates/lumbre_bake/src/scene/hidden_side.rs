@@ -1,4 +1,5 @@
-//! Which sides of surfaces can never be seen: the inside of a closed mesh. Not which points lie inside: rays tell.
+//! Finds the sides of surfaces that can never be seen: the insides of closed meshes. Whether a point lies inside a mesh
+//! is decided by rays (`occlusion`).
 
 use std::collections::HashMap;
 
@@ -6,15 +7,15 @@ use glam::Vec3;
 
 use crate::disjoint_sets::DisjointSets;
 
-/// For each triangle, its connected piece if that is closed: every directed edge has one that runs back.
-/// Vertices are the same where their coordinates are, bit by bit.
+/// For each triangle, the number of its connected piece if that piece is closed, that is, if every directed edge is
+/// matched by one in the opposite direction. Vertices count as the same if their coordinates are equal bit for bit.
 pub(crate) fn closed_pieces(triangles: &[[Vec3; 3]]) -> Vec<Option<u32>> {
     let mut vertices: HashMap<[u32; 3], u32> = HashMap::new();
     let corners: Vec<[u32; 3]> = triangles
         .iter()
         .map(|triangle| {
             triangle.map(|position| {
-                // -0 and 0 are one place.
+                // Adding zero turns -0 into 0, which is the same position.
                 let key = (position + Vec3::ZERO).to_array().map(f32::to_bits);
                 let next = vertices.len() as u32;
                 *vertices.entry(key).or_insert(next)
@@ -53,9 +54,9 @@ mod tests {
         let closed = triangles.len();
         let far = Vec3::splat(9.0);
         triangles.push([far, far + Vec3::X, far + Vec3::Y]);
-        let found = closed_pieces(&triangles);
-        assert!(found[..closed].iter().all(Option::is_some));
-        assert!(found[closed].is_none());
+        let pieces = closed_pieces(&triangles);
+        assert!(pieces[..closed].iter().all(Option::is_some));
+        assert!(pieces[closed].is_none());
         triangles.remove(0);
         assert!(closed_pieces(&triangles).iter().all(Option::is_none));
     }

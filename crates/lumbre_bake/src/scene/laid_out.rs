@@ -1,10 +1,10 @@
-//! A scene as light meets it, from objects, in one step: what the tests of later stages begin with.
+//! Builds a `BakeScene` and its layout from objects in one step, for the tests of later stages.
 
 use super::{BakeScene, Canonical, LightmapLayout, SceneObject, density_of, lay_out};
 use crate::BakeOptions;
 use crate::cancel_token::CancelToken;
 
-/// Objects laid out as densely as the options ask, and their triangles.
+/// The layout of the objects at the density that the options request, and the scene of their triangles.
 pub(crate) fn laid_out(
     objects: &[SceneObject],
     space: Canonical,

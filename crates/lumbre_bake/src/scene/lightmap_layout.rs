@@ -1,4 +1,5 @@
-//! Where every object's texels are: its own `uv1` where it has sound ones, an unwrap where not, and the size of its map.
+//! Lightmap coordinates and map size of every object: its own `uv1` if that is sound, else a new unwrap. Textures that
+//! read `uv1` make room for the unwrap in `texture_coordinates`.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -14,18 +15,18 @@ use crate::cancel_token::CancelToken;
 use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions, Density};
 
-/// The texels of one object.
+/// The lightmap of one object.
 #[derive(Clone, Debug)]
 pub(crate) struct MapLayout {
-    /// One per part of the object, with `uv1`.
+    /// One mesh per primitive of the object, with lightmap coordinates in `uv1`.
     pub meshes: Vec<Arc<TriangleMesh>>,
-    /// Of each part, whether its textures' coordinates moved from `uv1` to `uv0`.
+    /// For each primitive, whether its textures' coordinates moved from `uv1` to `uv0`.
     pub moved: Vec<bool>,
-    /// Texels across.
+    /// Texels in a row.
     pub width: u32,
-    /// Texel rows.
+    /// Number of texel rows.
     pub height: u32,
-    /// Index of its first texel in the row of all maps.
+    /// Index of its first texel in the sequence of all maps' texels.
     pub first: usize,
 }
 
@@ -48,19 +49,19 @@ impl MapLayout {
     }
 }
 
-/// The texels of all objects.
+/// The lightmaps of all objects.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightmapLayout {
     /// One per object.
     pub maps: Vec<MapLayout>,
-    /// Texels of all maps.
+    /// Number of texels of all maps together.
     pub texels: usize,
-    /// Texels per canonical unit that were aimed at.
+    /// Target density, texels per canonical unit.
     pub density: f64,
 }
 
 impl LightmapLayout {
-    /// The texel at a point of a triangle; none where it is not on its map.
+    /// The texel at a point of a triangle; `None` if the point lies outside of its map.
     pub fn texel_at(&self, triangle: &SceneTriangle, at: (f32, f32)) -> Option<MapTexel> {
         let map = &self.maps[triangle.object as usize];
         let place = triangle.place_on_map(at);
@@ -69,14 +70,15 @@ impl LightmapLayout {
     }
 }
 
-/// Texels that [`Density::Automatic`] aims at.
+/// Number of texels that [`Density::Automatic`] aims at.
 const AUTOMATIC_TEXELS: f64 = 500_000.0;
 /// Largest side of a map.
 const LARGEST_SIDE: u32 = 8192;
-/// Most texels of all maps: 4 GiB of working memory at some 64 bytes each.
+/// Most texels of all maps together: 4 GiB of working memory at some 64 bytes each.
 const MAX_TEXELS: u64 = 1 << 26;
 
-/// Texels per canonical unit of objects whose lightmap scale is 1: exact under a scale of 2^k, unlike metres; 1 where maps have a size instead.
+/// Texels per canonical unit for objects whose lightmap scale is 1; 1 if the options give the size of maps instead.
+/// Unlike a density per metre, it stays exact when the scene is scaled by 2^k.
 pub(crate) fn density_of(objects: &[SceneObject], space: Canonical, options: &BakeOptions) -> f64 {
     let area = || -> f64 {
         objects
@@ -94,7 +96,7 @@ pub(crate) fn density_of(objects: &[SceneObject], space: Canonical, options: &Ba
     }
 }
 
-/// Lays out every object, with so many texels per canonical unit.
+/// Lays out every object, at `density` texels per canonical unit.
 pub(crate) fn lay_out(
     objects: &[SceneObject],
     space: Canonical,
@@ -108,15 +110,15 @@ pub(crate) fn lay_out(
     let mut texels = 0u64;
     for object in objects {
         let key = instance_key(object, space);
-        let made = match instances.get(&key) {
+        let object_layout = match instances.get(&key) {
             Some(known) => known.clone(),
             None => {
-                let made = lay_out_object(object, space, density, options, stop, warnings)?;
-                instances.insert(key, made.clone());
-                made
+                let object_layout = lay_out_object(object, space, density, options, stop, warnings)?;
+                instances.insert(key, object_layout.clone());
+                object_layout
             }
         };
-        let ObjectLayout { meshes, moved, width, height } = made;
+        let ObjectLayout { meshes, moved, width, height } = object_layout;
         texels += u64::from(width) * u64::from(height);
         if texels > MAX_TEXELS {
             return Err(BakeError::TooManyTexels { texels, limit: MAX_TEXELS });
@@ -127,15 +129,16 @@ pub(crate) fn lay_out(
     Ok(layout)
 }
 
-/// Objects that share their meshes and differ by a rotation and translation only share their coordinates.
+/// A key that is equal for objects with the same meshes whose transforms differ only by a rotation and translation:
+/// such objects share their lightmap coordinates.
 fn instance_key(object: &SceneObject, space: Canonical) -> Vec<u64> {
     let mut key = Vec::with_capacity(1 + object.primitives.len() * 7);
     key.push(object.lightmap_scale.to_bits());
-    for part in &object.primitives {
-        key.push(Arc::as_ptr(&part.mesh) as usize as u64);
-        // A mesh whose second set holds a texture's coordinates in one place may be free in another.
-        key.extend(sets_read(part.textures.as_ref()).map(u64::from));
-        let m = part.transform.matrix3;
+    for primitive in &object.primitives {
+        key.push(Arc::as_ptr(&primitive.mesh) as usize as u64);
+        // The textures of one instance of a mesh may read `uv1` while those of another leave it free.
+        key.extend(sets_read(primitive.textures.as_ref()).map(u64::from));
+        let m = primitive.transform.matrix3;
         let scale = space.scale * space.scale;
         for (a, b) in [
             (m.x_axis, m.x_axis),
@@ -145,7 +148,8 @@ fn instance_key(object: &SceneObject, space: Canonical) -> Vec<u64> {
             (m.y_axis, m.z_axis),
             (m.x_axis, m.z_axis),
         ] {
-            // Rotations differ in the last bits; a thousandth of the axes' size tells scales apart.
+            // Rotation perturbs the last bits, so products of the axes are compared rounded: lengths to the leading
+            // bits, cosines to a thousandth.
             let size = (a.length_squared() * b.length_squared()).sqrt();
             let cosine = if size > 0.0 { (a.dot(b) / size * 1000.0).round() } else { 0.0 };
             key.push((size * scale).to_bits() >> 40);
@@ -155,44 +159,43 @@ fn instance_key(object: &SceneObject, space: Canonical) -> Vec<u64> {
     key
 }
 
-/// All triangles of an object in canonical space.
+/// All triangles of an object as one mesh in canonical space.
 struct ObjectGeometry {
     mesh: TriangleMesh,
     area: f64,
-    /// Area in the unit square of `uv1`, if every part has it.
+    /// Area that the triangles cover in `uv1` space, if every primitive has `uv1`.
     uv_area: Option<f64>,
 }
 
 impl ObjectGeometry {
     fn new(object: &SceneObject, space: Canonical) -> Self {
         let mut mesh = TriangleMesh::default();
-        let has_uv =
-            object.primitives.iter().all(|part| !part.mesh.uv1.is_empty() || part.mesh.positions.is_empty());
-        for part in &object.primitives {
+        let has_uv = object.primitives.iter().all(|p| !p.mesh.uv1.is_empty() || p.mesh.positions.is_empty());
+        for primitive in &object.primitives {
             let base = mesh.positions.len() as u32;
-            let place = |p: &Vec3| space.position(part.transform.transform_point3(p.as_dvec3()));
-            mesh.positions.extend(part.mesh.positions.iter().map(place));
+            let place = |p: &Vec3| space.position(primitive.transform.transform_point3(p.as_dvec3()));
+            mesh.positions.extend(primitive.mesh.positions.iter().map(place));
             if has_uv {
-                mesh.uv1.extend_from_slice(&part.mesh.uv1);
+                mesh.uv1.extend_from_slice(&primitive.mesh.uv1);
             }
-            mesh.indices.extend(part.mesh.indices.iter().map(|index| index + base));
+            mesh.indices.extend(primitive.mesh.indices.iter().map(|index| index + base));
         }
         let (mut area, mut uv_area) = (0.0, 0.0);
         for triangle in mesh.triangles() {
             let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize].as_dvec3());
-            let own = 0.5 * (b - a).cross(c - a).length();
-            area += if own.is_finite() { own } else { 0.0 };
+            let triangle_area = 0.5 * (b - a).cross(c - a).length();
+            area += if triangle_area.is_finite() { triangle_area } else { 0.0 };
             if has_uv {
                 let [a, b, c] = triangle.map(|vertex| mesh.uv1[vertex as usize].as_dvec2());
-                let own = 0.5 * (b - a).perp_dot(c - a).abs();
-                uv_area += if own.is_finite() { own } else { 0.0 };
+                let triangle_area = 0.5 * (b - a).perp_dot(c - a).abs();
+                uv_area += if triangle_area.is_finite() { triangle_area } else { 0.0 };
             }
         }
         Self { mesh, area, uv_area: has_uv.then_some(uv_area) }
     }
 }
 
-/// What objects share that are laid out alike.
+/// The part of a [`MapLayout`] that instances of the same object share.
 #[derive(Clone)]
 struct ObjectLayout {
     meshes: Vec<Arc<TriangleMesh>>,
@@ -209,20 +212,41 @@ fn lay_out_object(
     stop: &CancelToken,
     warnings: &mut Vec<String>,
 ) -> Result<ObjectLayout, BakeError> {
-    let placed = ObjectGeometry::new(object, space);
+    let geometry = ObjectGeometry::new(object, space);
     let density = density * object.lightmap_scale;
-    let side_of_map = |side: u32| {
-        (f64::from(side) * object.lightmap_scale).round().clamp(4.0, f64::from(LARGEST_SIDE)) as u32
-    };
-    if let Some(uv_area) = placed.uv_area.filter(|&area| area > 0.0) {
+    if let Some(layout) = with_given_uv1(object, &geometry, density, options, warnings) {
+        return Ok(layout);
+    }
+    unwrapped_anew(object, &geometry, density, options, stop, warnings)
+}
+
+/// The side of a map whose size the options give as `side`, for the object's lightmap scale.
+fn scaled_side(object: &SceneObject, side: u32) -> u32 {
+    (f64::from(side) * object.lightmap_scale).round().clamp(4.0, f64::from(LARGEST_SIDE)) as u32
+}
+
+/// The object's layout by the `uv1` that its meshes have, if that can hold a lightmap; warns if it has `uv1` that
+/// cannot.
+fn with_given_uv1(
+    object: &SceneObject,
+    geometry: &ObjectGeometry,
+    density: f64,
+    options: &BakeOptions,
+    warnings: &mut Vec<String>,
+) -> Option<ObjectLayout> {
+    if let Some(uv_area) = geometry.uv_area.filter(|&area| area > 0.0) {
         let side = match options.density {
-            Density::MapSize(side) => side_of_map(side),
-            _ => ((placed.area / uv_area).sqrt() * density).ceil().clamp(4.0, f64::from(LARGEST_SIDE)) as u32,
+            Density::MapSize(side) => scaled_side(object, side),
+            _ => {
+                ((geometry.area / uv_area).sqrt() * density).ceil().clamp(4.0, f64::from(LARGEST_SIDE)) as u32
+            }
         };
-        match validate_uv1(&placed.mesh, side, side) {
+        match validate_uv1(&geometry.mesh, side, side) {
             Ok(report) if report.is_sound() => {
-                let meshes = object.primitives.iter().map(|part| Arc::clone(&part.mesh)).collect();
-                return Ok(ObjectLayout { meshes, moved: vec![false; object.primitives.len()], width: side, height: side });
+                let meshes =
+                    object.primitives.iter().map(|primitive| Arc::clone(&primitive.mesh)).collect();
+                let moved = vec![false; object.primitives.len()];
+                return Some(ObjectLayout { meshes, moved, width: side, height: side });
             }
             Ok(report) => warnings.push(format!(
                 "{}: its TEXCOORD_1 cannot hold a lightmap at {side} x {side} texels ({} triangles out of range, {} \
@@ -235,12 +259,24 @@ fn lay_out_object(
             Err(error) => warnings.push(format!("{}: {error}; it was unwrapped anew", object.name)),
         }
     }
-    if placed.uv_area == Some(0.0) && placed.area > 0.0 {
+    if geometry.uv_area == Some(0.0) && geometry.area > 0.0 {
         warnings.push(format!(
             "{}: its TEXCOORD_1 covers no area, or is not finite; it was unwrapped anew",
             object.name
         ));
     }
+    None
+}
+
+/// The object's layout by a new unwrap.
+fn unwrapped_anew(
+    object: &SceneObject,
+    geometry: &ObjectGeometry,
+    density: f64,
+    options: &BakeOptions,
+    stop: &CancelToken,
+    warnings: &mut Vec<String>,
+) -> Result<ObjectLayout, BakeError> {
     let (object, moved) = free_second(object)?;
     if moved.contains(&true) {
         warnings.push(format!(
@@ -249,47 +285,48 @@ fn lay_out_object(
             object.name
         ));
     }
-    let go_on = || !stop.is_cancelled();
-    let charted =
-        Charted::new(&placed.mesh, &placed.mesh.positions, UnwrapOptions::default().chart_angle, &go_on)
-            .map_err(|source| BakeError::Unwrap { object: object.name.clone(), source })?;
+    let may_continue = || !stop.is_cancelled();
+    let chart_angle = UnwrapOptions::default().chart_angle;
+    let charted = Charted::new(&geometry.mesh, &geometry.mesh.positions, chart_angle, &may_continue)
+        .map_err(|source| BakeError::Unwrap { object: object.name.clone(), source })?;
     let (unwrapped, width, height) = match options.density {
         Density::MapSize(side) => {
-            let asked = side_of_map(side);
-            let (made, side) = fit(&object, &placed, &charted, asked, options.gap)?;
-            if side > asked {
+            let requested = scaled_side(&object, side);
+            let (unwrapped, side) = unwrap_into_square(&object, geometry, &charted, requested, options.gap)?;
+            if side > requested {
                 warnings.push(format!(
-                    "{}: its {} charts do not fit a map of {asked} x {asked} texels; it got one of {side} x {side}",
+                    "{}: its {} charts do not fit a map of {requested} x {requested} texels; it got one of {side} x {side}",
                     object.name,
                     charted.len()
                 ));
             }
-            (made, side, side)
+            (unwrapped, side, side)
         }
         _ => {
-            let made = unwrap_at_most(&object, &charted, density, options.gap, warnings)?;
-            let (width, height) = (made.width.max(1), made.height.max(1));
-            (made, width, height)
+            let unwrapped = unwrap_at_most(&object, &charted, density, options.gap, warnings)?;
+            let (width, height) = (unwrapped.width.max(1), unwrapped.height.max(1));
+            (unwrapped, width, height)
         }
     };
-    // From the rectangle of the charts to the map it lies in.
+    // Maps coordinates from the charts' rectangle to the whole map.
     let shrink = Vec2::new(unwrapped.width as f32 / width as f32, unwrapped.height as f32 / height as f32);
     Ok(ObjectLayout { meshes: split(&object, &unwrapped, shrink), moved, width, height })
 }
 
-/// The densest unwrap that fits a square of `side` texels, or the next larger one by a power of two in which its charts have room; and its side.
-fn fit(
+/// About the densest unwrap that fits a square map, with the map's side. The side is `requested`, doubled until the
+/// charts fit at all.
+fn unwrap_into_square(
     object: &SceneObject,
-    placed: &ObjectGeometry,
+    geometry: &ObjectGeometry,
     charted: &Charted<'_>,
-    asked: u32,
+    requested: u32,
     gap: u32,
 ) -> Result<(Unwrapped, u32), BakeError> {
     let failed = |source| BakeError::Unwrap { object: object.name.clone(), source };
-    let mut side = asked;
+    let mut side = requested;
     let mut best = loop {
         match charted.unwrap(SPARSEST, gap, side) {
-            Ok(made) => break made,
+            Ok(unwrapped) => break unwrapped,
             Err(UnwrapError::TooLarge { .. }) if side < LARGEST_SIDE => side = (2 * side).min(LARGEST_SIDE),
             Err(UnwrapError::TooLarge { .. }) => {
                 return Err(BakeError::TooManyCharts {
@@ -301,13 +338,13 @@ fn fit(
             Err(source) => return Err(failed(source)),
         }
     };
-    // No packing exceeds one texel per texel.
-    let mut high = if placed.area > 0.0 { f64::from(side) / placed.area.sqrt() } else { 1.0 };
+    // Decrease the density from an upper bound (charts that fill the whole map) until an unwrap fits, then bisect.
+    let mut high = if geometry.area > 0.0 { f64::from(side) / geometry.area.sqrt() } else { 1.0 };
     let mut low = high;
     for _ in 0..MAX_DENSITIES {
         match charted.unwrap(low, gap, side) {
-            Ok(made) => {
-                best = made;
+            Ok(unwrapped) => {
+                best = unwrapped;
                 break;
             }
             Err(UnwrapError::TooLarge { .. }) => (high, low) = (low, 0.7 * low),
@@ -317,7 +354,7 @@ fn fit(
     for _ in 0..6 {
         let middle = 0.5 * (low + high);
         match charted.unwrap(middle, gap, side) {
-            Ok(made) => (best, low) = (made, middle),
+            Ok(unwrapped) => (best, low) = (unwrapped, middle),
             Err(UnwrapError::TooLarge { .. }) => high = middle,
             Err(source) => return Err(failed(source)),
         }
@@ -325,6 +362,8 @@ fn fit(
     Ok((best, side))
 }
 
+/// An unwrap at `density`, or, with a warning, at the next lower density at which its map does not exceed
+/// [`LARGEST_SIDE`].
 fn unwrap_at_most(
     object: &SceneObject,
     charted: &Charted<'_>,
@@ -335,7 +374,7 @@ fn unwrap_at_most(
     let mut tried = density;
     for _ in 0..MAX_DENSITIES {
         match charted.unwrap(tried, gap, LARGEST_SIDE) {
-            Ok(made) => {
+            Ok(unwrapped) => {
                 if tried < density {
                     let share = 100.0 * tried / density;
                     warnings.push(format!(
@@ -343,7 +382,7 @@ fn unwrap_at_most(
                         object.name
                     ));
                 }
-                return Ok(made);
+                return Ok(unwrapped);
             }
             Err(UnwrapError::TooLarge { .. }) => tried *= 0.7,
             Err(source) => return Err(BakeError::Unwrap { object: object.name.clone(), source }),
@@ -353,36 +392,39 @@ fn unwrap_at_most(
     Err(BakeError::TooManyCharts { object, charts, limit: LARGEST_SIDE })
 }
 
-/// Texels per canonical unit at which every chart has the fewest texels.
+/// Density so low that every chart has the fewest possible texels, in texels per canonical unit.
 const SPARSEST: f64 = 1e-9;
-/// Densities that are tried, each 0.7 of the one before: down to a millionth.
+/// Most densities that are tried, each 0.7 times the one before: down to a millionth.
 const MAX_DENSITIES: u32 = 40;
 
-/// Gives the parts their shares of the unwrapped whole.
+/// Divides the unwrap of the whole object among its primitives' meshes.
 fn split(object: &SceneObject, unwrapped: &Unwrapped, shrink: Vec2) -> Vec<Arc<TriangleMesh>> {
     let (mut first_vertex, mut first_index) = (0u32, 0usize);
     let mut meshes = Vec::with_capacity(object.primitives.len());
-    for part in &object.primitives {
-        let vertices = part.mesh.positions.len() as u32;
-        let own = first_vertex..first_vertex + vertices;
+    for primitive in &object.primitives {
+        let mesh = &primitive.mesh;
+        let vertices = mesh.positions.len() as u32;
+        let range = first_vertex..first_vertex + vertices;
+        // From vertices of the unwrap to vertices of the new mesh, and from those to vertices of the old one.
         let mut local = HashMap::new();
         let mut sources = Vec::new();
-        for (index, &source) in unwrapped.vertex_sources.iter().enumerate().filter(|(_, s)| own.contains(s)) {
+        for (index, &source) in unwrapped.vertex_sources.iter().enumerate().filter(|(_, s)| range.contains(s))
+        {
             local.insert(index as u32, sources.len() as u32);
             sources.push((index, (source - first_vertex) as usize));
         }
         fn copy<T: Copy>(values: &[T], sources: &[(usize, usize)]) -> Vec<T> {
             if values.is_empty() { Vec::new() } else { sources.iter().map(|&(_, s)| values[s]).collect() }
         }
-        let count = part.mesh.indices.len();
+        let count = mesh.indices.len();
         let indices = &unwrapped.mesh.indices[first_index..first_index + count];
         meshes.push(Arc::new(TriangleMesh {
-            positions: copy(&part.mesh.positions, &sources),
-            normals: copy(&part.mesh.normals, &sources),
-            tangents: copy(&part.mesh.tangents, &sources),
-            uv0: copy(&part.mesh.uv0, &sources),
+            positions: copy(&mesh.positions, &sources),
+            normals: copy(&mesh.normals, &sources),
+            tangents: copy(&mesh.tangents, &sources),
+            uv0: copy(&mesh.uv0, &sources),
             uv1: sources.iter().map(|&(index, _)| unwrapped.mesh.uv1[index] * shrink).collect(),
-            colors: copy(&part.mesh.colors, &sources),
+            colors: copy(&mesh.colors, &sources),
             indices: indices.iter().map(|index| local[index]).collect(),
         }));
         first_vertex += vertices;
@@ -391,7 +433,7 @@ fn split(object: &SceneObject, unwrapped: &Unwrapped, shrink: Vec2) -> Vec<Arc<T
     meshes
 }
 
-/// The box around a mesh in the world is that of its points; this is their place.
+/// The positions of a mesh's vertices in the world.
 pub(crate) fn world_points<'a>(
     transform: &'a DAffine3,
     mesh: &'a TriangleMesh,

@@ -1,4 +1,5 @@
-//! What a surface reflects, emits and lets through, at a point: factors, vertex colours and textures together.
+//! Reflectance, emission and opacity of a surface at a point, combined from material factors, vertex colours and
+//! textures.
 
 use std::sync::Arc;
 
@@ -9,10 +10,10 @@ use lumbre_scene::{MaterialTextures, TextureReference};
 
 use super::texture::sample;
 
-/// Reflectances above this never stop bouncing; they are brought down to it, with a warning.
+/// Larger reflectances are clamped to this, with a warning: with a reflectance of 1, bounces would never end.
 pub(crate) const LARGEST_REFLECTANCE: f32 = 0.999;
 
-/// What a surface reflects, emits and lets through.
+/// The material of a primitive, with the mesh whose vertex colours and texture coordinates it reads.
 #[derive(Clone, Debug)]
 pub(crate) struct SurfaceMaterial {
     pub material: Material,
@@ -28,12 +29,12 @@ pub(crate) enum Side {
 }
 
 impl SurfaceMaterial {
-    /// Whether what it reflects or emits changes over a triangle.
+    /// Whether reflectance, emission or opacity may vary within a triangle.
     pub fn varies(&self) -> bool {
         self.textures.is_some() || !self.mesh.colors.is_empty()
     }
 
-    /// Whether nothing of it reflects light.
+    /// Whether it reflects no light anywhere.
     pub fn is_black(&self) -> bool {
         let Material { front, back, unlit, .. } = &self.material;
         let metallic = self.textures.as_ref().is_some_and(|textures| textures.metallic_roughness.is_some());
@@ -42,40 +43,41 @@ impl SurfaceMaterial {
         *unlit || (black && !metallic)
     }
 
-    /// Whether its emission changes over a triangle.
+    /// Whether its emission varies within a triangle.
     pub fn emission_varies(&self) -> bool {
         self.textures.as_ref().is_some_and(|textures| textures.emissive.is_some())
     }
 
-    /// Texels of the emissive texture along the longest edge of a triangle; 0 without one.
+    /// Number of texels of the emissive texture along the longest edge of a triangle; 0 without such a texture.
     pub fn emission_texels(&self, vertices: [u32; 3]) -> f32 {
         let texture = self.textures.as_ref().and_then(|textures| textures.emissive.as_ref());
         texture.map_or(0.0, |texture| self.texels(texture, vertices, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]))
     }
 
-    /// Texels of the textures that the reflectance is read from along the longest edge of a part of a triangle, which is given by weights of
-    /// the second and third vertex; 0 without any.
-    pub fn reflectance_texels(&self, vertices: [u32; 3], part: [(f32, f32); 3]) -> f32 {
+    /// Number of texels, along the longest edge of a piece of a triangle, of the finest texture that the reflectance is
+    /// read from; 0 without textures. The piece's corners are given by the weights of the triangle's second and third
+    /// vertex.
+    pub fn reflectance_texels(&self, vertices: [u32; 3], piece: [(f32, f32); 3]) -> f32 {
         let Some(textures) = &self.textures else { return 0.0 };
         let metallic = textures.metallic_roughness.as_ref().map(|metallic| &metallic.texture);
         let read = [textures.base_color.as_ref(), metallic].into_iter().flatten();
-        read.map(|texture| self.texels(texture, vertices, part)).fold(0.0, f32::max)
+        read.map(|texture| self.texels(texture, vertices, piece)).fold(0.0, f32::max)
     }
 
-    /// Texels of a texture along the longest edge of a part of a triangle.
-    fn texels(&self, texture: &TextureReference, vertices: [u32; 3], part: [(f32, f32); 3]) -> f32 {
+    /// Number of texels of a texture along the longest edge of a piece of a triangle.
+    fn texels(&self, texture: &TextureReference, vertices: [u32; 3], piece: [(f32, f32); 3]) -> f32 {
         let coordinates = if texture.tex_coord == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
         let size = Vec2::new(texture.image.width as f32, texture.image.height as f32);
         let at = |vertex: u32| {
             coordinates.get(vertex as usize).copied().unwrap_or_default() * texture.scale * size
         };
         let [a, b, c] = vertices.map(at);
-        let [a, b, c] = part.map(|(u, v)| a + (b - a) * u + (c - a) * v);
+        let [a, b, c] = piece.map(|(u, v)| a + (b - a) * u + (c - a) * v);
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         if longest.is_finite() { longest } else { 0.0 }
     }
 
-    /// Whether light may pass through some of it.
+    /// Whether light may pass through parts of it.
     pub fn is_masked(&self) -> bool {
         match self.material.alpha_mode {
             AlphaMode::Opaque => false,
@@ -111,7 +113,7 @@ impl SurfaceMaterial {
         let emission = match (side, &self.material.back) {
             (Side::Front, _) => self.material.front.emission,
             (Side::Back, Some(back)) => back.emission,
-            // Emitters shine to the front unless a back of their own says otherwise.
+            // Without a separate back material, a surface emits from its front only.
             (Side::Back, None) => Vec3::ZERO,
         };
         if emission == Vec3::ZERO {
@@ -123,7 +125,7 @@ impl SurfaceMaterial {
         clean(emission * factor)
     }
 
-    /// Whether light is stopped: alpha against the cutoff, or one half where it blends.
+    /// Whether the surface blocks light at a point: alpha is compared with the cutoff, or with one half for blending.
     pub fn stops_light(&self, vertices: [u32; 3], weights: [f32; 3]) -> bool {
         let cutoff = match self.material.alpha_mode {
             AlphaMode::Opaque => return true,
@@ -135,6 +137,7 @@ impl SurfaceMaterial {
         self.material.alpha * texel * self.color(vertices, weights).w >= cutoff
     }
 
+    /// The interpolated vertex colour; white without vertex colours.
     fn color(&self, vertices: [u32; 3], weights: [f32; 3]) -> Vec4 {
         if self.mesh.colors.is_empty() {
             return Vec4::ONE;
@@ -142,6 +145,7 @@ impl SurfaceMaterial {
         (0..3).map(|i| self.mesh.colors[vertices[i] as usize] * weights[i]).sum()
     }
 
+    /// The texture's value at a point of a triangle; white if the mesh lacks the coordinates.
     fn read(&self, texture: &TextureReference, vertices: [u32; 3], weights: [f32; 3], srgb: bool) -> Vec4 {
         let coordinates = if texture.tex_coord == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
         if coordinates.is_empty() {
@@ -152,7 +156,7 @@ impl SurfaceMaterial {
     }
 }
 
-/// Negative, infinite and NaN channels count as none.
+/// Replaces negative, infinite and NaN channels by 0.
 fn clean(color: Vec3) -> Vec3 {
     Vec3::from_array(color.to_array().map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 }))
 }

@@ -1,11 +1,13 @@
-//! The mean of something that varies over a triangle, like a texture: of many small triangles, each by its middle.
+//! The mean over a triangle of something that varies on it, such as a texture: the triangle is divided evenly and each
+//! piece is sampled at its centroid.
 
 use glam::Vec3;
 
-/// Corners by weights of the second and third vertex.
+/// Corners of a piece, each by the barycentric weights of the triangle's second and third vertex.
 pub(crate) type Corners = [(f32, f32); 3];
 
-/// Mean over the middles of n² pieces of a triangle, by weights of its second and third corner.
+/// Mean of `value` at the centroids of n² equal pieces of a triangle, given by the barycentric weights of its second
+/// and third vertex.
 pub(crate) fn mean_of_points(n: u32, mut value: impl FnMut((f32, f32)) -> Vec3) -> Vec3 {
     if n <= 1 {
         return value((1.0 / 3.0, 1.0 / 3.0));
@@ -15,7 +17,7 @@ pub(crate) fn mean_of_points(n: u32, mut value: impl FnMut((f32, f32)) -> Vec3) 
     sum / (n * n) as f32
 }
 
-/// Calls `visit` with the corners of n² equal pieces of a triangle.
+/// Calls `visit` with the corners of each of n² equal pieces of a triangle.
 pub(crate) fn pieces(n: u32, mut visit: impl FnMut(Corners)) {
     let at = |a: u32, b: u32| (a as f32 / n as f32, b as f32 / n as f32);
     for a in 0..n {

@@ -1,5 +1,5 @@
-//! The static scene as light meets it: triangles in one space, what they reflect and emit, where their texels are.
-//! Not the World: `from_world` reads it once, before, and nothing here writes it.
+//! The static scene in the form that the baker computes with: triangles in one space, their materials, and the layout
+//! of their lightmap texels. `from_world` reads it once from the World; nothing here writes to the World.
 
 mod box_tree;
 pub(crate) mod crossings;

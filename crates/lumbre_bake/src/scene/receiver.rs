@@ -1,20 +1,20 @@
-//! A point that receives light, as sources and rays see it. Not what it shows: that is a texel or a patch.
+//! A surface point at which arriving light is computed. The result is stored in a texel or a patch, not here.
 
 use glam::Vec3;
 
 use super::BakeScene;
 use super::material::Side;
 
-/// A point of a receiver.
+/// A point on a surface that receives light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Receiver {
     /// On the surface.
     pub position: Vec3,
-    /// Just off it.
+    /// Just off the surface, where rays start.
     pub origin: Vec3,
-    /// Unit, of the side that receives.
+    /// Unit geometric normal of the receiving side.
     pub geometric_normal: Vec3,
-    /// Unit, smooth.
+    /// Unit shading normal.
     pub normal: Vec3,
 }
 

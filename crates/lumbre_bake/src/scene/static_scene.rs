@@ -1,5 +1,6 @@
-//! What is baked, as plain data: meshes in their places with their materials, lights, the sky, and where something moves. Whoever has no World fills
-//! it in; `from_world` reads it from one. Not the scene as light meets it: that is `triangles`.
+//! The baker's input as plain data: placed meshes with their materials, lights, the sky, and the places of moving
+//! objects. `from_world` reads it from a World; callers without a World fill it in themselves. `triangles` derives from
+//! it the scene that the baker computes with.
 
 use std::sync::Arc;
 
@@ -12,18 +13,20 @@ use super::{Canonical, world_points};
 use crate::options::Probes;
 use crate::{BakeError, BakeOptions};
 
-/// A mesh in its place, with its material.
+/// A mesh placed in the world, with its material.
 #[derive(Clone, Debug, Default)]
 pub struct PlacedPrimitive {
-    /// Its points, in metres of its own space; with `uv1` in [0, 1] without overlaps it keeps these coordinates, else it is unwrapped.
+    /// The mesh, in metres in its local space. It keeps its `uv1` as lightmap coordinates if they lie in [0, 1] without
+    /// overlaps; otherwise it is unwrapped.
     pub mesh: Arc<TriangleMesh>,
-    /// What it reflects, emits and lets through.
+    /// Its reflectance, emission and opacity.
     pub material: Material,
-    /// Images that the material is multiplied by.
+    /// Images that the material's factors are multiplied by.
     pub textures: Option<MaterialTextures>,
-    /// From the mesh's space to the world's.
+    /// From the mesh's local space to the world.
     pub transform: DAffine3,
-    /// Frames show its emission as polygon lights, so that probes leave it out; lightmaps do not.
+    /// The renderer draws its emission as polygon lights in each frame, so probes leave that light out; lightmaps
+    /// include it.
     pub lights_frames: bool,
 }
 
@@ -34,43 +37,45 @@ pub struct SceneObject {
     pub name: String,
     /// At least one.
     pub primitives: Vec<PlacedPrimitive>,
-    /// Texels along one metre of it, relative to the rest of the scene: positive and finite, usually 1.
+    /// Its texel density (texels per metre) relative to the rest of the scene: positive and finite, usually 1.
     pub lightmap_scale: f64,
 }
 
-/// A point, spot or directional light in its place.
+/// A point, spot or directional light placed in the world.
 #[derive(Clone, Debug)]
 pub struct PlacedLight {
-    /// Its kind, colour and cone. With `BakeMode::Static` all its light is baked, with `Mixed` its bounces.
+    /// Its kind, colour and cone. With `BakeMode::Static` all of its light is baked, with `Mixed` only its bounces.
     pub light: Light,
-    /// Metres.
+    /// Position in the world, metres.
     pub position: DVec3,
     /// Unit vector along which it shines.
     pub axis: DVec3,
 }
 
-/// What is baked, in plain data. The order of objects and lights decides the random numbers: the same order gives the same bits.
+/// The input of a bake as plain data. The order of objects and lights decides the random numbers, so the same order
+/// gives the same bits.
 #[derive(Clone, Debug, Default)]
 pub struct StaticScene {
-    /// Everything that is lit and that light meets.
+    /// The static geometry: everything that receives, reflects, emits or blocks light.
     pub objects: Vec<SceneObject>,
-    /// The lights that are baked.
+    /// The lights to bake.
     pub lights: Vec<PlacedLight>,
     /// Radiance of the sky, W/(m² sr), not negative.
     pub sky: Vec3,
-    /// Points around what moves, metres: the probes reach as far. None where nothing moves.
+    /// Points that bound the moving objects, metres; the probe grid extends over them. `None` if nothing moves.
     pub moving: Option<Vec<DVec3>>,
 }
 
 impl SceneObject {
-    /// A name and what is drawn under it, at the density of the rest.
+    /// An object at the scene's usual texel density.
     pub fn new(name: impl Into<String>, primitives: Vec<PlacedPrimitive>) -> Self {
         Self { name: name.into(), primitives, lightmap_scale: 1.0 }
     }
 }
 
 impl PlacedLight {
-    /// Whether it has a size: lights in the sky an angle, others a radius. The other number of each is not read.
+    /// Whether it has a size: an angle for directional lights, a radius for the others. Each kind ignores the other
+    /// value.
     pub(crate) fn is_sized(&self) -> bool {
         match self.light.kind {
             LightKind::Directional => self.light.angle > 0.0,
@@ -88,7 +93,7 @@ impl PlacedLight {
 }
 
 impl StaticScene {
-    /// The scene as it is baked: without lights that are not baked, and with a sky that is light.
+    /// Validates the scene, removes lights that are not baked, and clamps the sky to non-negative finite radiance.
     ///
     /// # Errors
     /// [`BakeError`], which names the object.
@@ -115,12 +120,14 @@ impl StaticScene {
         self.objects.iter().flat_map(|object| &object.primitives)
     }
 
-    /// The space in which a bake of it computes.
+    /// The canonical space that a bake of it computes in.
     pub(crate) fn space(&self) -> Canonical {
-        Canonical::of(self.primitives().flat_map(|part| world_points(&part.transform, &part.mesh)))
+        Canonical::of(
+            self.primitives().flat_map(|primitive| world_points(&primitive.transform, &primitive.mesh)),
+        )
     }
 
-    /// Whether probes are called for, or why not.
+    /// `Ok` if probes are to be baked, else the reason why not.
     pub(crate) fn calls_for_probes(&self, options: &BakeOptions) -> Result<(), &'static str> {
         match options.probes {
             Probes::Never => Err("they are switched off"),
@@ -129,7 +136,7 @@ impl StaticScene {
         }
     }
 
-    /// The points around what moves.
+    /// The points that bound the moving objects; empty if nothing moves.
     pub(crate) fn moving_points(&self) -> &[DVec3] {
         self.moving.as_deref().unwrap_or_default()
     }

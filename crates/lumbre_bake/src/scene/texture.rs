@@ -1,10 +1,11 @@
-//! Reads a material's texture at a point, bilinearly, as glTF wraps and transforms it. No mip levels: patches average.
+//! Reads a material's texture at a point with bilinear filtering and glTF's wrap modes and transform. There are no mip
+//! levels: patches and emitters average over several points instead.
 
 use glam::{Vec2, Vec4};
 use lumbre_optics::decode_srgb_byte;
 use lumbre_scene::{TextureReference, Wrap};
 
-/// RGBA at texture coordinates; colour channels decoded from sRGB if asked.
+/// RGBA at texture coordinates; the colour channels are decoded from sRGB if `srgb` is set.
 pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
     let uv = texture.transformed(uv);
     if !uv.is_finite() {
@@ -29,15 +30,17 @@ pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
     top.lerp(bottom, fraction.y)
 }
 
+/// The column or row inside the image that `index` wraps to.
 fn wrap(index: f32, size: u32, wrap: Wrap) -> usize {
     let size_f = size.max(1) as f32;
     let last = size.max(1) as usize - 1;
-    // What is left of the division, without the slow exact one: far away rounding may be off by a texel, and is limited below.
-    let within = |period: f32| index - period * (index / period).floor();
+    // The remainder without the slow exact `%`. For large indices, rounding may be off by a texel, so the result is
+    // clamped below.
+    let remainder = |period: f32| index - period * (index / period).floor();
     let wrapped = match wrap {
-        Wrap::Repeat => within(size_f),
+        Wrap::Repeat => remainder(size_f),
         Wrap::MirroredRepeat => {
-            let period = within(2.0 * size_f);
+            let period = remainder(2.0 * size_f);
             if period < size_f { period } else { 2.0 * size_f - 1.0 - period }
         }
         Wrap::ClampToEdge => index.max(0.0),
@@ -66,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn centres_are_exact_and_the_middle_is_the_mean() {
+    fn texel_centres_are_exact_and_halfway_is_the_mean() {
         let texture = two_texels();
         assert_eq!(sample(&texture, Vec2::new(0.25, 0.5), true).x, 0.0);
         assert_eq!(sample(&texture, Vec2::new(0.75, 0.5), true).x, 1.0);

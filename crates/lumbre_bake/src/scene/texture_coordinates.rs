@@ -1,5 +1,6 @@
-//! Room for lightmap coordinates where a material's textures read `uv1`: they move to `uv0` if nothing reads that, and normal and occlusion
-//! maps, which no bake reads, make way. Not the unwrap that takes their place.
+//! Frees `uv1` for lightmap coordinates where a material's textures read it: the textures' coordinates move to `uv0` if
+//! nothing reads that, and normal and occlusion maps, which no bake reads, are dropped if necessary. The unwrap that
+//! then fills `uv1` is in `lightmap_layout`.
 
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use lumbre_scene::MaterialTextures;
 use super::{PlacedPrimitive, SceneObject};
 use crate::BakeError;
 
-/// Which of a mesh's two sets of coordinates a material's textures read.
+/// Which of a mesh's two sets of texture coordinates a material's textures read.
 pub(crate) fn sets_read(textures: Option<&MaterialTextures>) -> [bool; 2] {
     let mut read = [false; 2];
     for texture in textures.into_iter().flat_map(MaterialTextures::references) {
@@ -26,12 +27,13 @@ fn without_second_surface_maps(textures: &MaterialTextures) -> MaterialTextures 
     textures
 }
 
-/// Whether a mesh's two sets are read, and are not the same.
+/// Whether both of a mesh's sets are read, and differ.
 fn reads_different_sets(mesh: &TriangleMesh, textures: Option<&MaterialTextures>) -> bool {
     sets_read(textures) == [true, true] && mesh.uv0 != mesh.uv1
 }
 
-/// The textures of a mesh, reading `uv0`. Where they read both sets, normal and occlusion maps on `uv1` are gone: for them there is no room.
+/// The textures of a mesh, all reading `uv0`. If they read two different sets, the normal and occlusion maps on `uv1`
+/// are dropped, since there is no set left for them.
 pub(crate) fn reading_first(mesh: &TriangleMesh, textures: &MaterialTextures) -> MaterialTextures {
     let mut textures = match reads_different_sets(mesh, Some(textures)) {
         true => without_second_surface_maps(textures),
@@ -43,33 +45,36 @@ pub(crate) fn reading_first(mesh: &TriangleMesh, textures: &MaterialTextures) ->
     textures
 }
 
-/// The object with `uv1` free for the lightmap, and the parts of which `uv1` became `uv0`.
+/// The object with `uv1` free for the lightmap, and for each primitive whether its textures were changed to read `uv0`.
 ///
 /// # Errors
-/// [`BakeError::CoordinatesInUse`] where both sets are read, by more than normal and occlusion maps, and differ: a mesh has no third.
+/// [`BakeError::CoordinatesInUse`] if both sets are read, differ, and `uv1` is read by more than normal and occlusion
+/// maps: a mesh has no third set.
 pub(crate) fn free_second(object: &SceneObject) -> Result<(SceneObject, Vec<bool>), BakeError> {
     let mut freed = object.clone();
     let mut moved = vec![false; object.primitives.len()];
-    for (part, moved) in freed.primitives.iter_mut().zip(&mut moved) {
-        let Some(textures) = part.textures.as_ref().filter(|textures| sets_read(Some(textures))[1]) else {
+    for (primitive, moved) in freed.primitives.iter_mut().zip(&mut moved) {
+        let Some(textures) = primitive.textures.as_ref().filter(|textures| sets_read(Some(textures))[1])
+        else {
             continue;
         };
-        let read_first = reading_first(&part.mesh, textures);
-        if reads_different_sets(&part.mesh, Some(textures)) {
+        let read_first = reading_first(&primitive.mesh, textures);
+        if reads_different_sets(&primitive.mesh, Some(textures)) {
             if sets_read(Some(&without_second_surface_maps(textures)))[1] {
                 return Err(BakeError::CoordinatesInUse { object: object.name.clone() });
             }
         } else {
-            part.mesh = Arc::new(TriangleMesh { uv0: part.mesh.uv1.clone(), ..(*part.mesh).clone() });
+            primitive.mesh =
+                Arc::new(TriangleMesh { uv0: primitive.mesh.uv1.clone(), ..(*primitive.mesh).clone() });
         }
-        part.textures = Some(read_first);
+        primitive.textures = Some(read_first);
         *moved = true;
     }
     Ok((freed, moved))
 }
 
-/// A part's textures, which read `uv0` if its `uv1` has moved there.
-pub(crate) fn textures_of(part: &PlacedPrimitive, moved: bool) -> Option<MaterialTextures> {
-    let read_first = |textures| reading_first(&part.mesh, textures);
-    if moved { part.textures.as_ref().map(read_first) } else { part.textures.clone() }
+/// A primitive's textures, changed to read `uv0` if `moved`.
+pub(crate) fn textures_of(primitive: &PlacedPrimitive, moved: bool) -> Option<MaterialTextures> {
+    let read_first = |textures| reading_first(&primitive.mesh, textures);
+    if moved { primitive.textures.as_ref().map(read_first) } else { primitive.textures.clone() }
 }

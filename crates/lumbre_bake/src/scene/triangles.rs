@@ -1,7 +1,8 @@
-//! The triangles that light meets, in canonical space: relative to the scene's centre, scaled by a power of two so
-//! that the largest coordinate is in [1, 2). A scene scaled by 2^k is then baked with the very same numbers.
+//! The scene's triangles in canonical space: relative to the scene's centre, and scaled by a power of two so that the
+//! largest coordinate is in [1, 2). A scene scaled by 2^k is then baked with exactly the same numbers.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DMat3, DVec3, Vec2, Vec3};
+use lumbre_mesh::TriangleMesh;
 use lumbre_rays::{Bvh, triangle_extent};
 use serde::{Deserialize, Serialize};
 
@@ -12,21 +13,21 @@ use super::leaks::Leaks;
 use super::material::{LARGEST_REFLECTANCE, Side};
 use super::rooms::{Room, all_within, pieces};
 use super::texture_coordinates::textures_of;
-use super::{LightmapLayout, SceneObject, SurfaceMaterial};
+use super::{LightmapLayout, PlacedPrimitive, SceneObject, SurfaceMaterial, world_points};
 use crate::BakeError;
 use crate::cancel_token::CancelToken;
 
-/// The space in which everything is computed.
+/// The canonical space that the baker computes in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Canonical {
     /// Its origin in the world, metres.
     pub center: DVec3,
-    /// World metres to canonical units: a power of two.
+    /// Canonical units per world metre: a power of two.
     pub scale: f64,
 }
 
 impl Canonical {
-    /// For the finite points of a scene.
+    /// The canonical space of a scene with these points; points that are not finite are ignored.
     pub fn of(points: impl Iterator<Item = DVec3>) -> Self {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for point in points.filter(|point| point.is_finite()) {
@@ -37,7 +38,7 @@ impl Canonical {
         }
         let center = 0.5 * low + 0.5 * high;
         let reach = (high - center).max_element();
-        // log2 is exact enough to be off by one at worst, which is as good.
+        // Rounding in log2 can put the exponent off by one at worst, which is good enough.
         let exponent = if reach > 0.0 { reach.log2().floor().clamp(-900.0, 900.0) } else { 0.0 };
         Self { center, scale: (-exponent).exp2() }
     }
@@ -47,47 +48,48 @@ impl Canonical {
         self.place(world).as_vec3()
     }
 
-    /// The same, not rounded.
+    /// A world position in canonical units, without rounding to f32.
     pub fn place(&self, world: DVec3) -> DVec3 {
         (world - self.center) * self.scale
     }
 
-    /// A canonical position in the world, metres.
+    /// The world position, in metres, of a canonical position.
     pub fn world(&self, position: Vec3) -> DVec3 {
         position.as_dvec3() / self.scale + self.center
     }
 }
 
-/// A triangle that light meets.
+/// A triangle of the scene.
 #[derive(Clone, Debug)]
 pub(crate) struct SceneTriangle {
     /// Counter-clockwise seen from the front, canonical units.
     pub corners: [Vec3; 3],
-    /// Unit, geometric.
+    /// Unit geometric normal.
     pub normal: Vec3,
     /// Square canonical units.
     pub area: f32,
     /// Largest absolute coordinate.
     pub extent: f32,
-    /// Unit normals at the corners; the geometric one where the mesh has none.
+    /// Unit shading normals at the corners; the geometric normal where the mesh has no usable one.
     pub normals: [Vec3; 3],
-    /// Whether the three normals are the geometric one.
+    /// Whether the three shading normals equal the geometric one (nearly).
     pub flat: bool,
     /// Lightmap coordinates in texels.
     pub uv: [Vec2; 3],
-    /// Index of its material.
+    /// Index of its material in [`BakeScene::surfaces`].
     pub surface: u32,
-    /// Index of its object and map.
+    /// Index of its object, which is also that of its map.
     pub object: u32,
-    /// Vertices of its mesh.
+    /// Vertex indices in its mesh.
     pub vertices: [u32; 3],
-    /// Light reaches its back too: double-sided, and not the inside of a closed piece.
+    /// Whether its back takes part in light transport too: it is double-sided, and not part of a closed piece.
     pub two_sided: bool,
-    /// Part of a closed piece: a ray that meets its back began inside.
+    /// Whether it belongs to a closed piece of its mesh, so that a ray that hits its back started inside.
     pub closed: bool,
-    /// The closed piece, if it looks outward: what is inside sees nothing, whatever lies against it from outside.
+    /// The number of its closed piece, if that is a solid (its fronts face outward). No light enters a solid, even
+    /// through surfaces that coincide with its outside.
     pub solid: Option<u32>,
-    /// Another triangle in the same place meets the light.
+    /// Whether a coincident triangle replaces it.
     pub is_hidden_duplicate: bool,
 }
 
@@ -98,7 +100,7 @@ impl SceneTriangle {
         a + (b - a) * u + (c - a) * v
     }
 
-    /// The unit shading normal there, on the front.
+    /// The unit shading normal of the front at barycentric weights of the second and third vertex.
     pub fn shading_normal(&self, u: f32, v: f32) -> Vec3 {
         if self.flat {
             return self.normal;
@@ -107,7 +109,7 @@ impl SceneTriangle {
         (a * (1.0 - u - v) + b * u + c * v).normalize_or(self.normal)
     }
 
-    /// The same point on its map, in texels.
+    /// The point's position on its map, in texels.
     pub fn place_on_map(&self, (u, v): (f32, f32)) -> Vec2 {
         let [a, b, c] = self.uv;
         a + (b - a) * u + (c - a) * v
@@ -122,35 +124,36 @@ impl SceneTriangle {
     }
 }
 
-/// The static scene as light meets it.
+/// The static scene in the form that the baker computes with.
 #[derive(Debug)]
 pub(crate) struct BakeScene {
     pub space: Canonical,
     pub triangles: Vec<SceneTriangle>,
-    /// Of the objects, for people.
+    /// Names of the objects, for messages.
     pub names: Vec<String>,
     pub surfaces: Vec<SurfaceMaterial>,
-    /// What rays meet.
+    /// The hierarchy for ray casts.
     pub bvh: Bvh,
-    /// What lies near a place.
+    /// Finds the triangles near a place.
     pub boxes: BoxTree,
     /// Whether some surface lets light through in places.
     pub masked: bool,
-    /// Rays that ended where none should.
+    /// Counter of rays that ended where no ray should.
     pub leaks: Leaks,
-    /// Whether nobody waits for what is computed of it any more.
+    /// Set when the bake is cancelled.
     pub stop: CancelToken,
-    /// The closed pieces that look inward.
+    /// The closed pieces whose fronts face inward.
     pub rooms: Vec<Room>,
-    /// All that shines is inside of rooms: nothing leaves them.
+    /// Whether all light sources are inside rooms, so that the outside is dark.
     pub dark_outside: bool,
 }
 
-/// Most triangles: patches and texels name them by 32 bits, the hierarchy by 29.
+/// Most triangles: patches and texels store triangle indices in 32 bits, the hierarchy in 29.
 const MAX_TRIANGLES: usize = 1 << 28;
 
 impl BakeScene {
-    /// Extracts the triangles; odd ones are named in `warnings`.
+    /// Builds the scene from the objects and their layout. `warnings` reports triangles that are left out or replaced,
+    /// and materials that are corrected.
     pub fn new(
         objects: &[SceneObject],
         layout: &LightmapLayout,
@@ -158,7 +161,7 @@ impl BakeScene {
         stop: &CancelToken,
         warnings: &mut Vec<String>,
     ) -> Result<Self, BakeError> {
-        let count = objects.iter().flat_map(|o| &o.primitives).map(|part| part.mesh.triangle_count()).sum();
+        let count = objects.iter().flat_map(|o| &o.primitives).map(|p| p.mesh.triangle_count()).sum();
         if count > MAX_TRIANGLES {
             return Err(BakeError::TooManyTriangles { triangles: count, limit: MAX_TRIANGLES });
         }
@@ -166,14 +169,14 @@ impl BakeScene {
         let (mut rooms, mut solids) = (Vec::new(), Vec::new());
         for (index, object) in objects.iter().enumerate() {
             let first = triangles.len();
-            extract(object, index as u32, layout, space, &mut triangles, &mut surfaces, warnings);
+            extract_object(object, index as u32, layout, space, &mut triangles, &mut surfaces, warnings);
             mark_closed(&mut triangles, first, &mut rooms, &mut solids);
         }
-        without_hollow(&mut triangles, &rooms, &solids, warnings);
-        mark_superseded(&mut triangles, &surfaces, warnings);
-        let solid: Vec<[Vec3; 3]> = triangles
+        unmark_hollow_solids(&mut triangles, &rooms, &solids, warnings);
+        mark_hidden_duplicates(&mut triangles, &surfaces, warnings);
+        let corners: Vec<[Vec3; 3]> = triangles
             .iter()
-            // Both trees leave out what is not a number, and keep the indices.
+            // Both trees leave out triangles with NaN corners, and keep the indices of the others.
             .map(|t| if t.is_hidden_duplicate { [Vec3::NAN; 3] } else { t.corners })
             .collect();
         let masked = surfaces.iter().any(SurfaceMaterial::is_masked);
@@ -181,8 +184,8 @@ impl BakeScene {
         let leaks = Leaks::new(closed_scene);
         Ok(Self {
             space,
-            bvh: Bvh::build(&solid),
-            boxes: BoxTree::new(&solid, stop),
+            bvh: Bvh::build(&corners),
+            boxes: BoxTree::new(&corners, stop),
             triangles,
             names: objects.iter().map(|object| object.name.clone()).collect(),
             surfaces,
@@ -195,7 +198,8 @@ impl BakeScene {
     }
 }
 
-fn extract(
+/// Appends an object's triangles and materials.
+fn extract_object(
     object: &SceneObject,
     index: u32,
     layout: &LightmapLayout,
@@ -206,75 +210,24 @@ fn extract(
 ) {
     let map = &layout.maps[index as usize];
     let size = Vec2::new(map.width as f32, map.height as f32);
-    let (mut not_finite, mut without_area) = (0, 0);
-    for ((part, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
+    let mut left_out = LeftOut::default();
+    for ((primitive, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
         let surface = surfaces.len() as u32;
-        // A texture brings its factor down; what is above the limit after that is clamped texel by texel.
-        let textured = part
+        // A texture lowers its factor, so the factor alone says nothing; `SurfaceMaterial` clamps the product at each
+        // point.
+        let textured = primitive
             .textures
             .as_ref()
             .is_some_and(|textures| textures.base_color.is_some() || textures.metallic_roughness.is_some());
-        check_reflectance(&part.material.front.diffuse, textured, &object.name, warnings);
+        check_reflectance(&primitive.material.front.diffuse, textured, &object.name, warnings);
         surfaces.push(SurfaceMaterial {
-            material: part.material.clone(),
-            textures: textures_of(part, moved),
+            material: primitive.material.clone(),
+            textures: textures_of(primitive, moved),
             mesh: mesh.clone(),
         });
-        let positions: Vec<Vec3> = mesh
-            .positions
-            .iter()
-            .map(|p| space.position(part.transform.transform_point3(p.as_dvec3())))
-            .collect();
-        let linear = part.transform.matrix3;
-        let mirrored = linear.determinant() < 0.0;
-        // The cofactor matrix turns normals under any scale; a mirror image keeps its front by the winding below.
-        let cofactor = glam::DMat3::from_cols(
-            linear.y_axis.cross(linear.z_axis),
-            linear.z_axis.cross(linear.x_axis),
-            linear.x_axis.cross(linear.y_axis),
-        ) * if mirrored { -1.0 } else { 1.0 };
-        for triangle in mesh.triangles() {
-            let [a, b, c] = triangle;
-            let vertices = if mirrored { [a, c, b] } else { [a, b, c] };
-            let corners = vertices.map(|vertex| positions[vertex as usize]);
-            if !corners.iter().all(|corner| corner.is_finite()) {
-                not_finite += 1;
-                continue;
-            }
-            let [p, q, r] = corners.map(|corner| corner.as_dvec3());
-            let cross = (q - p).cross(r - p);
-            let longest =
-                (q - p).length_squared().max((r - p).length_squared()).max((r - q).length_squared());
-            // The rounding of f32 coordinates leaves a sliver no direction of its own.
-            let Some(normal) = cross.try_normalize().filter(|_| cross.length() > 1e-9 * longest) else {
-                without_area += 1;
-                continue;
-            };
-            let normal = normal.as_vec3();
-            let normals = vertices.map(|vertex| {
-                let own = mesh.normals.get(vertex as usize).copied().unwrap_or(Vec3::ZERO);
-                let own = (cofactor * own.as_dvec3()).normalize_or_zero().as_vec3();
-                // Zero, NaN or turned away: the geometric normal.
-                if own.is_finite() && own.dot(normal) > 0.1 { own } else { normal }
-            });
-            triangles.push(SceneTriangle {
-                corners,
-                normal,
-                area: (0.5 * cross.length()) as f32,
-                extent: triangle_extent(&corners),
-                flat: normals.iter().all(|own| own.dot(normal) > 0.9999),
-                normals,
-                uv: vertices.map(|vertex| mesh.uv1.get(vertex as usize).copied().unwrap_or_default() * size),
-                surface,
-                object: index,
-                vertices,
-                two_sided: part.material.double_sided,
-                closed: false,
-                solid: None,
-                is_hidden_duplicate: false,
-            });
-        }
+        extract_triangles(primitive, mesh, space, size, (surface, index), triangles, &mut left_out);
     }
+    let LeftOut { not_finite, without_area } = left_out;
     if not_finite > 0 {
         warnings.push(format!(
             "{}: {not_finite} triangles with NaN or infinite positions were left out",
@@ -286,26 +239,106 @@ fn extract(
     }
 }
 
-/// A closed piece that looks outward: its number, and the box around it.
+/// Numbers of triangles that are left out of the scene.
+#[derive(Default)]
+struct LeftOut {
+    not_finite: usize,
+    without_area: usize,
+}
+
+/// Appends the triangles of a primitive, which has the indices `surface` and `object`, on a map of `size` texels.
+fn extract_triangles(
+    primitive: &PlacedPrimitive,
+    mesh: &TriangleMesh,
+    space: Canonical,
+    size: Vec2,
+    (surface, object): (u32, u32),
+    triangles: &mut Vec<SceneTriangle>,
+    left_out: &mut LeftOut,
+) {
+    let positions: Vec<Vec3> =
+        world_points(&primitive.transform, mesh).map(|point| space.position(point)).collect();
+    let linear = primitive.transform.matrix3;
+    let is_mirrored = linear.determinant() < 0.0;
+    let cofactor = normal_matrix(linear, is_mirrored);
+    for [a, b, c] in mesh.triangles() {
+        let vertices = if is_mirrored { [a, c, b] } else { [a, b, c] };
+        let corners = vertices.map(|vertex| positions[vertex as usize]);
+        if !corners.iter().all(|corner| corner.is_finite()) {
+            left_out.not_finite += 1;
+            continue;
+        }
+        let Some((normal, area)) = normal_and_area(&corners) else {
+            left_out.without_area += 1;
+            continue;
+        };
+        let normals = vertices.map(|vertex| {
+            let mesh_normal = mesh.normals.get(vertex as usize).copied().unwrap_or(Vec3::ZERO);
+            let shading = (cofactor * mesh_normal.as_dvec3()).normalize_or_zero().as_vec3();
+            // The geometric normal replaces one that is zero, NaN or turned too far away from it.
+            if shading.is_finite() && shading.dot(normal) > 0.1 { shading } else { normal }
+        });
+        triangles.push(SceneTriangle {
+            corners,
+            normal,
+            area,
+            extent: triangle_extent(&corners),
+            flat: normals.iter().all(|shading| shading.dot(normal) > 0.9999),
+            normals,
+            uv: vertices.map(|vertex| mesh.uv1.get(vertex as usize).copied().unwrap_or_default() * size),
+            surface,
+            object,
+            vertices,
+            two_sided: primitive.material.double_sided,
+            closed: false,
+            solid: None,
+            is_hidden_duplicate: false,
+        });
+    }
+}
+
+/// The cofactor matrix of a linear map: it transforms normals correctly under any scale. Mirrored meshes get the
+/// reversed winding, and here the opposite sign, so that their fronts stay fronts.
+fn normal_matrix(linear: DMat3, is_mirrored: bool) -> DMat3 {
+    DMat3::from_cols(
+        linear.y_axis.cross(linear.z_axis),
+        linear.z_axis.cross(linear.x_axis),
+        linear.x_axis.cross(linear.y_axis),
+    ) * if is_mirrored { -1.0 } else { 1.0 }
+}
+
+/// Unit geometric normal and area of a triangle; `None` if it is degenerate, or so narrow that the rounding of its f32
+/// coordinates leaves its normal undefined.
+fn normal_and_area(corners: &[Vec3; 3]) -> Option<(Vec3, f32)> {
+    let [p, q, r] = corners.map(|corner| corner.as_dvec3());
+    let cross = (q - p).cross(r - p);
+    let longest = (q - p).length_squared().max((r - p).length_squared()).max((r - q).length_squared());
+    let normal = cross.try_normalize().filter(|_| cross.length() > 1e-9 * longest)?;
+    Some((normal.as_vec3(), (0.5 * cross.length()) as f32))
+}
+
+/// A closed piece whose fronts face outward: its number and bounding box.
 type Solid = (u32, Vec3, Vec3);
 
-/// Marks the closed pieces of an object whose triangles begin at `first`, and lists them.
+/// Marks the triangles of closed pieces in the object whose triangles begin at `first`, and appends its rooms and
+/// solids.
 fn mark_closed(
     triangles: &mut [SceneTriangle],
     first: usize,
     rooms: &mut Vec<Room>,
     solids: &mut Vec<Solid>,
 ) {
-    // Corners number the pieces.
+    // Within an object, pieces are numbered by vertices, of which there are at most three per triangle.
     let number = |piece: u32| 3 * first as u32 + piece;
     let triangles = &mut triangles[first..];
     let corners: Vec<[Vec3; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
-    let names = closed_pieces(&corners);
-    let pieces = pieces(&corners, &names);
-    for (triangle, name) in triangles.iter_mut().zip(&names) {
-        triangle.closed = name.is_some();
-        triangle.two_sided &= name.is_none();
-        let place = name.and_then(|name| pieces.binary_search_by_key(&name, |piece| piece.number).ok());
+    let piece_numbers = closed_pieces(&corners);
+    let pieces = pieces(&corners, &piece_numbers);
+    for (triangle, piece_number) in triangles.iter_mut().zip(&piece_numbers) {
+        triangle.closed = piece_number.is_some();
+        triangle.two_sided &= piece_number.is_none();
+        let place = piece_number
+            .and_then(|piece_number| pieces.binary_search_by_key(&piece_number, |piece| piece.number).ok());
         triangle.solid = place.filter(|&at| pieces[at].room.is_none()).map(|at| number(pieces[at].number));
     }
     for piece in pieces {
@@ -316,32 +349,34 @@ fn mark_closed(
     }
 }
 
-/// Pairs of rooms and solids that are looked at: with more, none counts as solid.
+/// Most pairs of rooms and solids that are tested; with more, no piece counts as a solid.
 const MAX_PAIRS: usize = 1 << 24;
 
-/// What has a room inside of it, as a house's outside has, is no solid.
-fn without_hollow(
+/// Unmarks solids that contain a room, as the outside of a house does.
+fn unmark_hollow_solids(
     triangles: &mut [SceneTriangle],
     rooms: &[Room],
     solids: &[Solid],
     warnings: &mut Vec<String>,
 ) {
-    let all = rooms.len().saturating_mul(solids.len()) > MAX_PAIRS;
-    if all {
+    let too_many = rooms.len().saturating_mul(solids.len()) > MAX_PAIRS;
+    if too_many {
         warnings.push(format!(
             "{} rooms and {} closed pieces are too many to tell which are in which; what a piece stands on may be lit inside of it",
             rooms.len(),
             solids.len()
         ));
     }
-    let is_hollow = |(_, low, high): &&Solid| all || rooms.iter().any(|room| room.is_within(*low, *high));
-    // Ascending, as objects and their corners are.
+    let is_hollow =
+        |(_, low, high): &&Solid| too_many || rooms.iter().any(|room| room.is_within(*low, *high));
+    // In ascending order, as objects and their pieces are, which the binary search needs.
     let hollow: Vec<u32> = solids.iter().filter(is_hollow).map(|(number, ..)| *number).collect();
     for triangle in triangles {
         triangle.solid = triangle.solid.filter(|solid| hollow.binary_search(solid).is_err());
     }
 }
 
+/// Warns of a reflectance that will be clamped.
 fn check_reflectance(diffuse: &Vec3, textured: bool, name: &str, warnings: &mut Vec<String>) {
     if diffuse.max_element() > LARGEST_REFLECTANCE && !textured {
         warnings.push(format!(
@@ -354,16 +389,17 @@ fn check_reflectance(diffuse: &Vec3, textured: bool, name: &str, warnings: &mut 
     }
 }
 
-fn mark_superseded(
+/// Marks the triangles that a coincident one replaces.
+fn mark_hidden_duplicates(
     triangles: &mut [SceneTriangle],
     surfaces: &[SurfaceMaterial],
     warnings: &mut Vec<String>,
 ) {
     let corners: Vec<[Vec3; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
-    let third = [1.0 / 3.0; 3];
+    let centroid = [1.0 / 3.0; 3];
     let emits: Vec<bool> = triangles
         .iter()
-        .map(|t| surfaces[t.surface as usize].emission(Side::Front, t.vertices, third) != Vec3::ZERO)
+        .map(|t| surfaces[t.surface as usize].emission(Side::Front, t.vertices, centroid) != Vec3::ZERO)
         .collect();
     let mut count = 0;
     for (triangle, is_hidden_duplicate) in triangles.iter_mut().zip(is_hidden_duplicate(&corners, &emits)) {

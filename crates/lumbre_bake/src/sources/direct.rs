@@ -1,41 +1,42 @@
-//! The direct light of a receiver, with its error and what was seen of the sources. Not how it is found.
+//! The direct light of a receiver, with its variance and a summary of which sources are visible. `irradiance` computes
+//! it.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::sampling::hash;
 
-/// Irradiance, W/m².
+/// Direct irradiance of a receiver, W/m².
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Direct {
-    /// From emissive triangles and static lights: goes into the map.
+    /// From emissive triangles and static lights; stored in the lightmap.
     pub baked: Vec3,
-    /// From mixed lights: bounces only.
+    /// From mixed lights; only its bounces are stored.
     pub mixed: Vec3,
-    /// Variance that sampling leaves in `baked`, mean of the channels, as it is stated of this receiver alone.
+    /// Variance that sampling leaves in `baked`, mean of the channels, as stated for this receiver alone.
     pub variance: f32,
-    /// The part of it that is caution: what it is more than is to be expected of many such receivers.
+    /// The safety margin in `variance`: by how much it exceeds the variance to be expected over many such receivers.
     pub caution: f32,
-    /// Rays cast.
+    /// Number of rays cast.
     pub rays: u32,
-    /// Whether samples had a part in it: more would tell more.
+    /// Whether it was estimated from samples, so that more samples would improve it.
     pub sampled: bool,
-    /// What of the sources was seen.
+    /// Which sources are visible.
     pub seen: VisibilitySummary,
 }
 
-/// What a receiver saw of the sources.
+/// A summary of which sources are visible from a receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct VisibilitySummary {
-    /// Some source was seen by one sample and not by another: a penumbra, or a shadow's edge.
+    /// Whether some source is visible from one sample and hidden from another: a penumbra or a shadow edge.
     pub partly: bool,
-    /// One number for each combination of hidden sources.
+    /// A hash of the set of hidden sources.
     pub signature: u32,
 }
 
 impl VisibilitySummary {
-    /// What the samples to source `id` found. Sources that are wholly seen, or that do not shine here, leave no mark: which of them
-    /// are asked together differs from receiver to receiver.
+    /// Adds how many samples found source `id` visible and how many found it hidden. A source that is fully visible, or
+    /// does not shine here, leaves no trace: which sources are sampled together differs from receiver to receiver.
     pub(crate) fn add(&mut self, id: u32, visible: u32, hidden: u32) {
         self.partly |= visible > 0 && hidden > 0;
         if hidden > 0 && visible == 0 {
@@ -45,7 +46,7 @@ impl VisibilitySummary {
 }
 
 impl Direct {
-    /// What bounces.
+    /// The light that bounces on.
     pub fn total(&self) -> Vec3 {
         self.baked + self.mixed
     }

@@ -1,5 +1,6 @@
-//! Where some emitters are, where they shine to and how much, and from that about what they bring a receiver: of one group of them, or of eight
-//! side by side with the same bits. Not the hierarchy of such groups: that is `emitter_tree`.
+//! Bounds of a group of emitters (position, emission directions, power), and from them an estimate of the light that
+//! the group brings to a receiver: for one group, or with SIMD for eight groups and the same bits. The hierarchy of
+//! groups is `emitter_tree`.
 
 use std::sync::LazyLock;
 
@@ -8,30 +9,33 @@ use glam::Vec3;
 
 use crate::scene::Receiver;
 
-/// Some emitters as a whole.
+/// Bounds of a group of emitters.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct EmitterBounds {
-    /// By power.
+    /// Mean position, weighted by power.
     pub center: Vec3,
-    /// Around the centre, of all corners.
+    /// Radius of the sphere about `center` that contains all corners.
     pub radius: f32,
-    /// Unit, or zero: by power, where it shines to; no normal differs from it by more than `spread`, a chord.
+    /// Mean emission direction, weighted by power: a unit vector, or zero.
     pub axis: Vec3,
+    /// Largest distance (a chord, not an angle) of an emitter's normal from `axis`.
     pub spread: f32,
-    /// Σ radiance · area, the sum of its channels.
+    /// Σ radiance · area, summed over the channels.
     pub power: f32,
 }
 
-/// Least share of a cosine in a weight, so that none is 0 where light may arrive.
+/// Lower bound of the cosine factors in a weight, so that no weight is 0 where light may arrive.
 pub(crate) const MIN_COSINE: f32 = 0.02;
 
 impl EmitterBounds {
-    /// About what they bring receivers within `reach` of one (irradiance, sum of the channels); positive.
+    /// Estimates the irradiance, summed over the channels and positive, that the group brings to receivers within
+    /// `reach` of the given one.
     pub fn weight(&self, receiver: &Receiver, reach: f32) -> f32 {
         let towards = self.center - receiver.position;
         let size = self.radius + reach;
         let squared = towards.length_squared() + size * size;
-        // Directions are a little short where they are near: all of it counts there anyway.
+        // Close to the group, this makes the direction shorter than a unit vector, but there `subtends` makes all of it
+        // count.
         let inverse = 1.0 / squared.sqrt();
         let subtends = size * inverse;
         let receives = (towards.dot(receiver.normal) * inverse + subtends).clamp(MIN_COSINE, 1.0);
@@ -40,23 +44,23 @@ impl EmitterBounds {
     }
 }
 
-/// Groups side by side.
+/// Groups that are evaluated together with SIMD.
 pub(crate) const LANES: usize = 8;
-/// Numbers of one group: its centre, radius, axis, spread and power.
-const NUMBERS: usize = 9;
+/// Numbers that describe one group: its centre, radius, axis, spread and power.
+const FIELDS: usize = 9;
 
-/// The bounds of up to eight groups, number by number.
+/// The bounds of up to eight groups as a structure of arrays.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct BoundsEight([[f32; LANES]; NUMBERS]);
+pub(crate) struct BoundsEight([[f32; LANES]; FIELDS]);
 
-/// The bounds of several groups, eight by eight.
+/// The bounds of any number of groups, in blocks of eight.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct BoundsLanes {
     eights: Vec<BoundsEight>,
     count: usize,
 }
 
-/// A receiver's place and normal in all lanes.
+/// A receiver's position and normal, broadcast to all lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct ReceiverLanes<S: Simd> {
     position: [f32x8<S>; 3],
@@ -72,19 +76,19 @@ impl<S: Simd> ReceiverLanes<S> {
     }
 }
 
-/// The instructions that this machine has; every level computes the same bits.
+/// The SIMD instruction set of this machine; the results are the same bits with every one.
 pub(crate) static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
 
 impl BoundsEight {
-    /// Of at most eight; the lanes that are left weigh nothing that may be read.
+    /// The bounds of at most eight groups; the weights of unused lanes are meaningless.
     pub fn new(groups: &[EmitterBounds]) -> Self {
-        let mut numbers = [[0.0; LANES]; NUMBERS];
+        let mut fields = [[0.0; LANES]; FIELDS];
         for (lane, group) in groups.iter().enumerate().take(LANES) {
             let EmitterBounds { center, radius, axis, spread, power } = *group;
-            let own = [center.x, center.y, center.z, radius, axis.x, axis.y, axis.z, spread, power];
-            numbers.iter_mut().zip(own).for_each(|(number, own)| number[lane] = own);
+            let values = [center.x, center.y, center.z, radius, axis.x, axis.y, axis.z, spread, power];
+            fields.iter_mut().zip(values).for_each(|(field, value)| field[lane] = value);
         }
-        Self(numbers)
+        Self(fields)
     }
 
     /// The [`EmitterBounds::weight`] of each group.
@@ -93,7 +97,7 @@ impl BoundsEight {
         let ReceiverLanes { position, normal, simd } = *receiver;
         let one = simd.splat_f32x8(1.0);
         let [x, y, z, radius, along_x, along_y, along_z, spread, power] =
-            self.0.each_ref().map(|number| f32x8::from_slice(simd, number));
+            self.0.each_ref().map(|field| f32x8::from_slice(simd, field));
         let towards = [x - position[0], y - position[1], z - position[2]];
         let dot = |a: [f32x8<S>; 3], b: [f32x8<S>; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let squared = dot(towards, towards) + radius * radius;
@@ -102,9 +106,9 @@ impl BoundsEight {
         let receives = (dot(towards, normal) * inverse + subtends).max(MIN_COSINE).min(1.0);
         let emits = spread + subtends - dot(towards, [along_x, along_y, along_z]) * inverse;
         let emits = emits.max(MIN_COSINE).min(1.0);
-        let mut found = [0.0; LANES];
-        (power * receives * emits * inverse * inverse).store_slice(&mut found);
-        found
+        let mut weights = [0.0; LANES];
+        (power * receives * emits * inverse * inverse).store_slice(&mut weights);
+        weights
     }
 }
 
@@ -118,7 +122,7 @@ impl BoundsLanes {
         self.count
     }
 
-    /// The [`EmitterBounds::weight`] of each group, in the first places of `weights`, which has room for all.
+    /// Writes the [`EmitterBounds::weight`] of each group to the front of `weights`, which must be long enough.
     pub fn weights(&self, receiver: &Receiver, weights: &mut [f32]) {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         if let Some(simd) = LEVEL.as_avx2() {
@@ -145,7 +149,7 @@ mod tests {
     use crate::sampling::{Sequence, Stream};
 
     #[test]
-    fn eight_side_by_side_weigh_what_each_does() {
+    fn simd_weights_equal_those_of_single_groups() {
         let sequence = Sequence::new(9, Stream::Test(91), 0);
         let vector = |index: u32, set: u32| {
             let [x, y, z, _] = sequence.point(index, set);

@@ -1,5 +1,5 @@
-//! A point of an emissive triangle as a sample: by its area, or by the solid angle where it is near. Not the choice of the triangle: that is
-//! `emitter_tree`'s.
+//! Samples a point on an emissive triangle: uniformly by area, or by solid angle where the triangle is near.
+//! `emitter_tree` chooses the triangle.
 
 use glam::{DVec3, Vec3};
 
@@ -7,14 +7,15 @@ use super::emitters::Emitter;
 use crate::sampling::triangle_point;
 use crate::scene::Receiver;
 
-/// A point of an emitter, and the irradiance that the emitter would bring if it were all like this point.
+/// A sampled point on an emitter.
 pub(crate) struct EmitterSample {
     pub target: Vec3,
+    /// The unoccluded irradiance by this point over its probability density: an estimate for the whole emitter.
     pub light: Vec3,
     pub distance: f32,
 }
 
-/// The point of an emitter at (u, v) of the unit square; none where no light leaves or arrives.
+/// Samples an emitter at (u, v) of the unit square; `None` if the point sends no light to the receiver.
 pub(crate) fn sample_emitter(
     emitter: &Emitter,
     receiver: &Receiver,
@@ -27,7 +28,8 @@ pub(crate) fn sample_emitter(
     if height <= 0.0 {
         return None;
     }
-    // What a point of it is worth differs by the distance where it is near: there directions are drawn evenly instead.
+    // Where the emitter is near, the contribution of its points varies strongly with their distance; sampling
+    // directions uniformly avoids that.
     let nearest = p.length_squared().min(q.length_squared()).min(r.length_squared());
     let by_direction = match emitter.area > WIDE * nearest.max(height * height) {
         true => spherical_triangle([p, q, r], u, v),
@@ -55,11 +57,12 @@ pub(crate) fn sample_emitter(
     Some(EmitterSample { target, light, distance: distance_squared.sqrt() })
 }
 
-/// Of an emitter's area, over its squared distance, from which on its directions are sampled and not its points.
+/// Ratio of an emitter's area to its squared distance from which on it is sampled by solid angle.
 const WIDE: f32 = 0.05;
 
-/// A direction at (u, v) of the unit square to a triangle, evenly spread over its solid angle, and that angle (Arvo, "Stratified Sampling of
-/// Spherical Triangles", 1995). None where it is too narrow for numbers of single precision.
+/// A direction towards a triangle, distributed uniformly over its solid angle, and that angle, for (u, v) of the unit
+/// square (Arvo, "Stratified Sampling of Spherical Triangles", 1995). `None` if the triangle is too narrow for single
+/// precision.
 fn spherical_triangle(corners: [Vec3; 3], u: f32, v: f32) -> Option<(Vec3, f32)> {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3().normalize_or_zero());
     let normal = |p: DVec3, q: DVec3| p.cross(q).try_normalize();

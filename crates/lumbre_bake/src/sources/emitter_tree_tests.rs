@@ -1,4 +1,4 @@
-//! The hierarchy of emitters against sums over all of them.
+//! Tests of the hierarchy of emitters against exact sums over all emitters.
 
 use lumbre_mesh::shapes;
 
@@ -20,7 +20,7 @@ fn emitter(corners: [Vec3; 3], radiance: Vec3) -> Emitter {
     }
 }
 
-/// A sphere of about segments² triangles.
+/// The emitters of a sphere of about segments² triangles.
 fn ball(center: Vec3, radius: f32, segments: u32, radiance: Vec3) -> Vec<Emitter> {
     let mesh = shapes::uv_sphere(1.0, segments, segments / 2);
     let triangles = mesh.triangle_positions().expect("a valid mesh");
@@ -40,7 +40,7 @@ fn exact(emitters: &[Emitter], receiver: &Receiver) -> DVec3 {
     emitters.iter().map(light).sum()
 }
 
-/// Two balls of different light and a quadrilateral; the lamps they are.
+/// The emitters of two spheres of different light and a quadrilateral, and the lamp of each emitter.
 fn scene() -> (Vec<Emitter>, Vec<u32>) {
     let mut emitters = ball(Vec3::new(0.3, 1.0, 0.0), 0.1, 44, Vec3::new(3.0, 2.0, 1.0));
     let first = emitters.len();
@@ -54,7 +54,7 @@ fn scene() -> (Vec<Emitter>, Vec<u32>) {
 }
 
 #[test]
-fn one_term_far_away_is_as_good_as_the_sum() {
+fn approximating_distant_nodes_by_one_term_is_close_to_the_exact_sum() {
     let (emitters, lamps) = scene();
     let tree = EmitterTree::new(&emitters, &lamps);
     let (mut worst, mut squares) = (0.0f64, 0.0);
@@ -63,18 +63,19 @@ fn one_term_far_away_is_as_good_as_the_sum() {
         let position = Vec3::new(3.0 * x - 1.5, 1.6 * y - 0.2, 3.0 * z - 1.5);
         let normal = if w < 0.7 { Vec3::Y } else { Vec3::new(0.6, 0.0, -0.8) };
         let at = receiver(position, normal);
-        let (found, expected) = (tree.unoccluded(&emitters, 0, &at).as_dvec3(), exact(&emitters, &at));
+        let (computed, expected) = (tree.unoccluded(&emitters, 0, &at).as_dvec3(), exact(&emitters, &at));
         let scale = expected.element_sum().max(1e-4);
-        let apart = (found - expected).abs().element_sum() / scale;
-        (worst, squares) = (worst.max(apart), squares + apart * apart / 400.0);
+        let error = (computed - expected).abs().element_sum() / scale;
+        (worst, squares) = (worst.max(error), squares + error * error / 400.0);
     }
     println!("worst of 400: {:.4} %, RMS {:.4} %", 100.0 * worst, 100.0 * squares.sqrt());
-    // (r/d)² = 0.0025, times some; where the receiver's own horizon or the lamp's cuts most of the light off, (r/d) itself.
+    // The error is a small multiple of (r/d)² = 0.0025; where the receiver's horizon or the lamp's cuts off most of the
+    // light, it is of the order of r/d itself.
     assert!(worst < 0.03 && squares.sqrt() < f64::from(TERM_ERROR), "{worst} {squares}");
 }
 
 #[test]
-fn a_part_holds_the_emitters_of_its_halves() {
+fn a_node_holds_the_emitters_of_its_children() {
     let (emitters, lamps) = scene();
     let tree = EmitterTree::new(&emitters, &lamps);
     let root = tree.root().expect("there are emitters");
@@ -89,9 +90,10 @@ fn a_part_holds_the_emitters_of_its_halves() {
         assert_eq!(tree.emitters_of(node), together);
         for half in halves {
             if tree.lamps(half) == 1 && tree.lamps(node) > 1 {
-                let own: Vec<u32> = tree.emitters_of(half).iter().map(|&e| lamps[e as usize]).collect();
-                assert!(own.iter().all(|lamp| *lamp == own[0]), "a lamp is one node");
-                lamps_found.push(own[0]);
+                let half_lamps: Vec<u32> =
+                    tree.emitters_of(half).iter().map(|&e| lamps[e as usize]).collect();
+                assert!(half_lamps.iter().all(|lamp| *lamp == half_lamps[0]), "a lamp is one node");
+                lamps_found.push(half_lamps[0]);
             }
         }
         open.extend(halves);
@@ -102,7 +104,7 @@ fn a_part_holds_the_emitters_of_its_halves() {
 }
 
 #[test]
-fn no_weight_is_zero_and_near_balls_fill_the_sky() {
+fn weights_are_positive_and_sines_grow_to_one_when_near() {
     let (emitters, lamps) = scene();
     let tree = EmitterTree::new(&emitters, &lamps);
     for i in 0..200 {
@@ -119,10 +121,10 @@ fn no_weight_is_zero_and_near_balls_fill_the_sky() {
 }
 
 #[test]
-fn samples_have_the_light_of_their_part_as_their_mean() {
+fn the_mean_of_samples_is_the_light_of_their_node() {
     let (emitters, lamps) = scene();
     let tree = EmitterTree::new(&emitters, &lamps);
-    // Walks that begin at a step and within one.
+    // Descents that start at a wide node and inside one.
     let mut nodes = vec![0];
     for place in 0..20 {
         nodes.extend(tree.children(nodes[place]).into_iter().flatten());
@@ -130,9 +132,9 @@ fn samples_have_the_light_of_their_part_as_their_mean() {
     for position in [Vec3::ZERO, Vec3::new(-0.5, 0.2, 0.3), Vec3::new(0.3, 0.8, 0.1)] {
         let at = receiver(position, Vec3::Y);
         for &node in &nodes {
-            let own: Vec<Emitter> =
+            let members: Vec<Emitter> =
                 tree.emitters_of(node).iter().map(|&emitter| emitters[emitter as usize].clone()).collect();
-            let expected = exact(&own, &at);
+            let expected = exact(&members, &at);
             if expected.element_sum() < 1e-2 * exact(&emitters, &at).element_sum() {
                 continue;
             }
@@ -151,15 +153,16 @@ fn samples_have_the_light_of_their_part_as_their_mean() {
                 sum += e.radiance.as_dvec3()
                     * f64::from(cosines * e.area / (towards.length_squared() * probability));
             }
-            let found = sum / f64::from(n);
-            // Relative deviation of a sample about 1: 5 sigma of 2^14 independent ones is 4 %; these are spread better.
-            let apart = (found - expected).abs().max_element() / expected.max_element();
-            assert!(apart < 0.02, "{position}, node {node}: {found} {expected}");
+            let mean = sum / f64::from(n);
+            // With a relative standard deviation of about 1 per sample, 5 sigma of 2^14 independent samples is 4 %; the
+            // low-discrepancy samples do better.
+            let error = (mean - expected).abs().max_element() / expected.max_element();
+            assert!(error < 0.02, "{position}, node {node}: {mean} {expected}");
         }
     }
 }
 
-/// A horizontal square that looks down, as two triangles.
+/// A horizontal square that emits downwards, as two triangles.
 fn square(middle: Vec3, side: f32) -> [Emitter; 2] {
     let corner = |x: f32, z: f32| middle + 0.5 * side * Vec3::new(x, 0.0, z);
     let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
@@ -167,7 +170,7 @@ fn square(middle: Vec3, side: f32) -> [Emitter; 2] {
 }
 
 #[test]
-fn a_ceiling_with_few_lamps_encloses_nobody_and_one_that_shines_does() {
+fn a_fully_emissive_ceiling_encloses_a_receiver_and_one_with_small_lamps_does_not() {
     let at = receiver(Vec3::ZERO, Vec3::Y);
     let exact = |emitters: &[Emitter]| -> f32 {
         let of = |e: &Emitter| point_to_triangle(DVec3::ZERO, DVec3::Y, &e.corners_f64);
@@ -176,13 +179,13 @@ fn a_ceiling_with_few_lamps_encloses_nobody_and_one_that_shines_does() {
     let lamps_of =
         |emitters: &[Emitter]| (0..emitters.len() as u32).map(|index| index / 2).collect::<Vec<_>>();
     let place = |i: i32| Vec3::new(0.4 * (i % 10) as f32 - 1.8, 1.0, 0.4 * (i / 10) as f32 - 1.8);
-    // A hundredth of the ceiling, and all of it.
+    // Lamps on a hundredth of the ceiling, and on all of it.
     for (side, encloses) in [(0.04, false), (0.4, true)] {
         let emitters: Vec<Emitter> = (0..100).flat_map(|i| square(place(i), side)).collect();
-        let found = EmitterTree::new(&emitters, &lamps_of(&emitters)).form_factor(&at);
+        let estimate = EmitterTree::new(&emitters, &lamps_of(&emitters)).form_factor(&at);
         let exact = exact(&emitters);
-        assert_eq!(found > 0.5, encloses, "{found} instead of {exact}");
-        // Whole triangles for their middles: about is enough.
-        assert!(found > 0.6 * exact && found < 1.6 * exact, "{found} instead of {exact}");
+        assert_eq!(estimate > 0.5, encloses, "{estimate} instead of {exact}");
+        // The estimate evaluates whole triangles at their centres, so it is only approximate.
+        assert!(estimate > 0.6 * exact && estimate < 1.6 * exact, "{estimate} instead of {exact}");
     }
 }

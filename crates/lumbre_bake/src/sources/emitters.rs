@@ -1,5 +1,5 @@
-//! Emissive triangles as sources: each a polygon of one radiance. A triangle whose emission varies is cut into pieces.
-//! Not what they light: that is `direct`.
+//! Emissive triangles as light sources, each of uniform radiance. A triangle whose emission varies is divided into
+//! pieces. Their light is computed in `area_light` and `shared_samples`.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -10,13 +10,13 @@ use crate::scene::material::Side;
 use crate::scene::mean_of_points::{mean_of_points, pieces};
 use crate::scene::{BakeScene, SceneTriangle, SurfaceMaterial};
 
-/// A triangle of one radiance.
+/// A triangle of uniform radiance.
 #[derive(Clone, Debug)]
 pub(crate) struct Emitter {
-    /// Counter-clockwise seen from where it shines to.
+    /// Counter-clockwise seen from the side that emits.
     pub corners: [Vec3; 3],
     pub corners_f64: [DVec3; 3],
-    /// Unit, to where it shines.
+    /// Unit normal of the side that emits.
     pub normal: Vec3,
     /// Square canonical units.
     pub area: f32,
@@ -35,19 +35,19 @@ impl Emitter {
     }
 }
 
-/// For each emitter the number of its lamp: triangles that share a corner, bit by bit, hang together.
+/// For each emitter the number of its lamp. A lamp is a connected set of emissive triangles: they are connected if they
+/// share a corner, bit for bit.
 pub(crate) fn lamps(scene: &BakeScene, emitters: &[Emitter]) -> Vec<u32> {
     let mut corners: HashMap<[u32; 3], u32> = HashMap::new();
     let mut lamps = DisjointSets::default();
     let mut of_triangle: HashMap<u32, u32> = HashMap::new();
     for emitter in emitters {
         of_triangle.entry(emitter.triangle).or_insert_with(|| {
-            let own = scene.triangles[emitter.triangle as usize].corners.map(|corner| {
-                // -0 and 0 are one place.
+            let [a, b, c] = scene.triangles[emitter.triangle as usize].corners.map(|corner| {
+                // Adding zero turns -0 into 0, which is the same position.
                 let key = (corner + Vec3::ZERO).to_array().map(f32::to_bits);
                 *corners.entry(key).or_insert_with(|| lamps.push())
             });
-            let [a, b, c] = own;
             let both = lamps.join(a, b);
             lamps.join(both, c)
         });
@@ -55,51 +55,54 @@ pub(crate) fn lamps(scene: &BakeScene, emitters: &[Emitter]) -> Vec<u32> {
     emitters.iter().map(|emitter| lamps.find(of_triangle[&emitter.triangle])).collect()
 }
 
-/// Texels of a texture along an edge of a piece, if that is not more than so many pieces along the edge of a triangle: what is finer
-/// is averaged.
+/// Texels along an edge of a piece that the division of a triangle aims at; finer detail is averaged.
 const TEXELS: f32 = 2.0;
+/// Most pieces along an edge of a triangle.
 const MAX_PIECES: u32 = 48;
-/// Pieces of all triangles together, beside one each.
-const MAX_OF_ALL: f64 = 200_000.0;
-/// Points along an edge of a piece over which its radiance is averaged, at most; and of all pieces together.
+/// Most pieces of all triangles together, not counting one for each triangle.
+const MAX_TOTAL_PIECES: f64 = 200_000.0;
+/// Most points along an edge of a piece over which its radiance is averaged.
 const MAX_POINTS: u32 = 64;
-const MAX_SAMPLES: f64 = (1 << 26) as f64;
+/// Most such points of all pieces together.
+const MAX_TOTAL_POINTS: f64 = (1 << 26) as f64;
 
-/// By how much all have to be coarser than their textures ask for, so that they are not too many.
+/// Factors by which all triangles are divided and sampled more coarsely than their textures require, to stay within the
+/// limits on the totals.
 #[derive(Clone, Copy)]
-struct Coarser {
+struct Coarsening {
     pieces: f32,
     points: f32,
 }
 
-/// How the emission of a triangle is read.
+/// How the emission of a triangle is divided and sampled.
 #[derive(Clone, Copy)]
-struct Reading {
+struct EmissionSampling {
     /// Texels along the longest edge.
     texels: f32,
-    /// Pieces along an edge, and points along the edge of a piece.
+    /// Pieces along an edge.
     pieces: u32,
+    /// Points along an edge of a piece.
     points: u32,
 }
 
-impl Reading {
-    fn new(surface: &SurfaceMaterial, vertices: [u32; 3], coarser: Coarser) -> Self {
+impl EmissionSampling {
+    fn new(surface: &SurfaceMaterial, vertices: [u32; 3], coarsening: Coarsening) -> Self {
         if !surface.emission_varies() {
             return Self { texels: 0.0, pieces: 1, points: 1 };
         }
         let texels = surface.emission_texels(vertices);
-        let pieces = ((texels / (TEXELS * coarser.pieces)).ceil() as u32).clamp(1, MAX_PIECES);
-        // Two points for each texel, so that none is left out.
-        let points = (2.0 * texels / (pieces as f32 * coarser.points)).ceil() as u32;
+        let pieces = ((texels / (TEXELS * coarsening.pieces)).ceil() as u32).clamp(1, MAX_PIECES);
+        // Two points per texel, so that no texel is missed.
+        let points = (2.0 * texels / (pieces as f32 * coarsening.points)).ceil() as u32;
         Self { texels, pieces, points: points.clamp(2, MAX_POINTS) }
     }
 }
 
-impl Coarser {
+impl Coarsening {
     fn of(scene: &BakeScene) -> Self {
-        let asked = Self { pieces: 1.0, points: 1.0 };
-        let sum = |coarser: Self, of: fn(Reading) -> f64| -> f64 {
-            let lit = scene
+        let none = Self { pieces: 1.0, points: 1.0 };
+        let sum = |coarsening: Self, count: fn(EmissionSampling) -> f64| -> f64 {
+            let triangles = scene
                 .triangles
                 .iter()
                 .filter(|triangle| !triangle.is_hidden_duplicate && !scene.stop.is_cancelled());
@@ -107,67 +110,68 @@ impl Coarser {
                 let surface = &scene.surfaces[triangle.surface as usize];
                 match surface.material.front.emission == Vec3::ZERO && surface.material.back.is_none() {
                     true => 0.0,
-                    false => of(Reading::new(surface, triangle.vertices, coarser)),
+                    false => count(EmissionSampling::new(surface, triangle.vertices, coarsening)),
                 }
             };
-            lit.map(of_triangle).sum()
+            triangles.map(of_triangle).sum()
         };
-        let pieces = sum(asked, |reading| f64::from(reading.pieces).powi(2) - 1.0);
-        let pieces = (pieces / MAX_OF_ALL).sqrt().max(1.0) as f32;
+        let pieces = sum(none, |sampling| f64::from(sampling.pieces).powi(2) - 1.0);
+        let pieces = (pieces / MAX_TOTAL_PIECES).sqrt().max(1.0) as f32;
         let points =
-            sum(Self { pieces, ..asked }, |reading| f64::from(reading.pieces * reading.points).powi(2));
-        Self { pieces, points: (points / MAX_SAMPLES).sqrt().max(1.0) as f32 }
+            sum(Self { pieces, ..none }, |sampling| f64::from(sampling.pieces * sampling.points).powi(2));
+        Self { pieces, points: (points / MAX_TOTAL_POINTS).sqrt().max(1.0) as f32 }
     }
 }
 
-/// What is read more coarsely than textures are, in words.
+/// Warnings about the objects whose emissive textures are divided more coarsely than [`TEXELS`] aims at.
 pub(crate) fn coarse_textures(scene: &BakeScene) -> Vec<String> {
-    let coarser = Coarser::of(scene);
-    // Of each object the triangle with the largest pieces.
-    let mut worst: BTreeMap<u32, Reading> = BTreeMap::new();
-    let across = |reading: &Reading| reading.texels / reading.pieces as f32;
+    let coarsening = Coarsening::of(scene);
+    // For each object, the triangle whose pieces span the most texels.
+    let mut worst: BTreeMap<u32, EmissionSampling> = BTreeMap::new();
+    let across = |sampling: &EmissionSampling| sampling.texels / sampling.pieces as f32;
     for triangle in scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate) {
         let surface = &scene.surfaces[triangle.surface as usize];
         let sides = [Some(&surface.material.front), surface.material.back.as_ref()];
         if sides.into_iter().flatten().any(|side| side.emission != Vec3::ZERO) {
-            let reading = Reading::new(surface, triangle.vertices, coarser);
-            let own = worst.entry(triangle.object).or_insert(reading);
-            if across(&reading) > across(own) {
-                *own = reading;
+            let sampling = EmissionSampling::new(surface, triangle.vertices, coarsening);
+            let object_worst = worst.entry(triangle.object).or_insert(sampling);
+            if across(&sampling) > across(object_worst) {
+                *object_worst = sampling;
             }
         }
     }
-    let is_coarse = |reading: &Reading| across(reading) > TEXELS * 1.001;
-    let words = |(object, reading): (u32, Reading)| {
-        let (across, points) = (across(&reading), reading.points);
+    let is_coarse = |sampling: &EmissionSampling| across(sampling) > TEXELS * 1.001;
+    let warning = |(object, sampling): (u32, EmissionSampling)| {
+        let (across, points) = (across(&sampling), sampling.points);
         let name = &scene.names[object as usize];
-        let mut words = format!(
+        let mut warning = format!(
             "{name}: its emissive texture has {:.0} texels along a triangle; it lights as {} pieces along there, each of one radiance, the \
              mean of {across:.0} texels along its edge",
-            reading.texels, reading.pieces
+            sampling.texels, sampling.pieces
         );
         if across > points as f32 {
-            words.push_str(&format!(" by {points} points: what is smaller may be missed"));
+            warning.push_str(&format!(" by {points} points: what is smaller may be missed"));
         }
-        words
+        warning
     };
-    worst.into_iter().filter(|(_, reading)| is_coarse(reading)).map(words).collect()
+    worst.into_iter().filter(|(_, sampling)| is_coarse(sampling)).map(warning).collect()
 }
 
-/// All emissive triangles.
+/// The emitters of the scene.
 pub(crate) fn emitters(scene: &BakeScene) -> Vec<Emitter> {
-    let mut found = Vec::new();
-    let coarser = Coarser::of(scene);
+    let mut emitters = Vec::new();
+    let coarsening = Coarsening::of(scene);
     for (index, triangle) in scene.triangles.iter().enumerate().filter(|(_, t)| !t.is_hidden_duplicate) {
         let surface = &scene.surfaces[triangle.surface as usize];
         for side in [Side::Front, Side::Back] {
             if scene.stop.is_cancelled() {
-                return found;
+                return emitters;
             }
             if side == Side::Back && !triangle.two_sided {
                 continue;
             }
-            let Reading { pieces: count, points, .. } = Reading::new(surface, triangle.vertices, coarser);
+            let EmissionSampling { pieces: count, points, .. } =
+                EmissionSampling::new(surface, triangle.vertices, coarsening);
             pieces(count, |[p, q, r]| {
                 if scene.stop.is_cancelled() {
                     return;
@@ -184,7 +188,7 @@ pub(crate) fn emitters(scene: &BakeScene) -> Vec<Emitter> {
                 if side == Side::Back {
                     corners.swap(1, 2);
                 }
-                found.push(Emitter {
+                emitters.push(Emitter {
                     corners,
                     corners_f64: corners.map(|corner| corner.as_dvec3()),
                     normal: triangle.side_normal(side),
@@ -196,5 +200,5 @@ pub(crate) fn emitters(scene: &BakeScene) -> Vec<Emitter> {
             });
         }
     }
-    found
+    emitters
 }

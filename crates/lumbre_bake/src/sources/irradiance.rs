@@ -1,5 +1,5 @@
-//! The direct light of a receiver from all sources together: those that have samples of their own, each by itself, and the others by samples that
-//! they share. Not which are which: that is `light_cut`.
+//! The direct light of a receiver from all sources: those that are sampled individually, each by itself, and the others
+//! by samples that they share. `light_cut` decides which are which.
 
 use super::direct::Direct;
 use super::light_cut::LightCut;
@@ -8,12 +8,13 @@ use crate::sampling::Sequence;
 use crate::scene::Receiver;
 use crate::visibility::occluders::Visibility;
 
-/// Samples of the sources that share them, for each of a source that has samples of its own.
-const SAMPLES_OF_SHARED: u32 = 4;
+/// Number of shared samples for each sample of an individually sampled source.
+const SHARED_SAMPLES_FACTOR: u32 = 4;
 
 impl Sources<'_> {
-    /// Mean irradiance of a receiver by `samples` shadow rays to each source that matters and some to the others together; `point` maps the
-    /// unit square onto its surface.
+    /// Mean irradiance of a receiver, by `samples` shadow rays to each source that matters and
+    /// [`SHARED_SAMPLES_FACTOR`] times as many to the others together. `point` maps the unit square onto the receiver's
+    /// surface.
     pub fn irradiance(
         &self,
         sequence: Sequence,
@@ -26,12 +27,12 @@ impl Sources<'_> {
         let reach = corners.map(|corner| corner.position.distance(anchor.position)).fold(0.0, f32::max);
         let cut = self.cut(&anchor, reach, &[]);
         let mut direct = self.irradiance_per_source(&cut, &Visibility::UNKNOWN, sequence, samples, point);
-        self.add_shared_light(&cut.shared, sequence, SAMPLES_OF_SHARED * samples, point, &mut direct);
+        self.add_shared_light(&cut.shared, sequence, SHARED_SAMPLES_FACTOR * samples, point, &mut direct);
         direct
     }
 
-    /// Mean irradiance by the sources that have samples of their own; without shadow rays where it is known what may stand `between`: those
-    /// are as exact as the receiver's points.
+    /// Mean irradiance by the sources that are sampled individually. For sources whose possible occluders `visibility`
+    /// knows, it casts no shadow rays, and visibility is exact at each of the receiver's points.
     pub fn irradiance_per_source(
         &self,
         cut: &LightCut,

@@ -1,39 +1,41 @@
-//! Which sources have samples of their own at a piece of surface, and the parts of the trees that the others are drawn from: a cut through the
-//! trees of emitters and lights, the brightest parts opened first (adaptive splitting: Conty Estevez and Kulla, "Importance Sampling of
-//! Many Lights with Adaptive Tree Splitting", 2018; Walter et al., "Lightcuts", 2005). What a receiver spends so follows from what matters
-//! there, and not from how many sources there are. Not their light: that is `direct` and `punctual`.
+//! Chooses which sources are sampled individually at a piece of surface, and the nodes from which the others are
+//! sampled: a cut through the trees of emitters and lights that opens the brightest nodes first (adaptive splitting:
+//! Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018; Walter et al.,
+//! "Lightcuts", 2005). The cost of a receiver thus depends on which sources matter there and not on how many there are.
+//! The light itself is computed in `area_light`, `punctual` and `shared_samples`.
 
 use std::collections::BinaryHeap;
 
 use super::emitter_bounds::BoundsLanes;
+use super::source_tree::clamp_below_one;
 use crate::scene::Receiver;
 use crate::sources::light_sources::Sources;
 
-/// How the sources are divided at a piece of surface: what is in none of the lists brings nothing there.
+/// How the sources are sampled at a piece of surface. Sources in none of the lists bring no light there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LightCut {
-    /// Parts of the emissive surfaces that have samples of their own: lamps.
+    /// Nodes of the emitter tree that are sampled individually: lamps, or groups of them.
     pub lamps: Vec<u32>,
-    /// Whether those are all lamps that there are.
-    pub all_apart: bool,
-    /// Lights that have, by number, ascending.
+    /// Whether `lamps` covers all lamps of the scene.
+    pub has_all_lamps: bool,
+    /// Indices of the punctual lights that are sampled individually, ascending.
     pub lights: Vec<u32>,
-    /// The others.
+    /// The other sources.
     pub shared: SharedSources,
 }
 
-/// Sources that share samples.
+/// The sources that share samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct SharedSources {
-    /// Parts of the trees, each with the running sum of their probabilities: the last is 1.
+    /// Nodes of the trees, each with the cumulative sum of the probabilities; the last sum is 1.
     branches: Vec<(Branch, f32)>,
-    /// Whether some are so near that each receiver has probabilities of its own.
+    /// Whether some node is so near that the probabilities must be computed for each receiver.
     near: bool,
-    /// Of those that are near, the first branches: the parts of the emissive surfaces.
+    /// If `near`, the bounds of the first branches: the nodes of the emitter tree.
     bounds: BoundsLanes,
 }
 
-/// A part of one of the trees.
+/// A node of one of the two trees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Branch {
     Emitters(u32),
@@ -48,7 +50,8 @@ impl SharedSources {
 }
 
 impl Sources<'_> {
-    /// Of sources that share samples, the part at `u` in [0, 1), the place within its interval stretched to [0, 1), and its probability.
+    /// Samples a branch of the shared sources by `u` in [0, 1). Returns the branch, `u` rescaled from the branch's
+    /// interval to [0, 1), and the branch's probability.
     pub(crate) fn pick_branch(
         &self,
         shared: &SharedSources,
@@ -63,16 +66,16 @@ impl Sources<'_> {
                 *weight = self.weight(*branch, receiver, 0.0);
             }
             let sum = weights[..shared.branches.len()].iter().sum::<f32>();
-            let wanted = u * sum;
+            let target = u * sum;
             let mut running = 0.0;
             for (weight, (branch, _)) in weights.iter().zip(&shared.branches) {
-                if wanted < running + weight {
-                    let u = ((wanted - running) / weight).clamp(0.0, 1.0 - f32::EPSILON);
+                if target < running + weight {
+                    let u = clamp_below_one((target - running) / weight);
                     return Some((*branch, u, weight / sum));
                 }
                 running += weight;
             }
-            // Rounding at the very end, or no weight at all.
+            // Rounding put `target` beyond the end of the sums, or all weights are 0.
             let (branch, weight) = (shared.branches[last].0, weights[last.min(MAX_NEAR_BRANCHES - 1)]);
             return (weight > 0.0).then(|| (branch, 1.0 - f32::EPSILON, weight / sum));
         }
@@ -80,12 +83,13 @@ impl Sources<'_> {
         let start = if at == 0 { 0.0 } else { shared.branches[at - 1].1 };
         let (branch, end) = shared.branches[at];
         let probability = (end - start).max(f32::MIN_POSITIVE);
-        Some((branch, ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON), probability))
+        Some((branch, clamp_below_one((u - start) / probability), probability))
     }
 }
 
 impl LightCut {
-    /// One number for the sources that have samples of their own: where it differs, so does what the others bring.
+    /// A hash of the individually sampled sources. Where it differs between receivers, so does the light of the shared
+    /// sources.
     pub fn key(&self) -> u64 {
         let mut hasher = blake3::Hasher::new();
         for number in self.lamps.iter().chain(&[u32::MAX]).chain(&self.lights) {
@@ -96,29 +100,35 @@ impl LightCut {
     }
 }
 
-/// Up to so many lamps, of so many emitters together, all have samples of their own: what is exact for them, or the
-/// exact sum over them times the share that is seen, is less noisy than samples.
+/// Up to this many lamps, all are sampled individually: their exact light, or their exact unoccluded light times the
+/// visible fraction, is less noisy than shared samples.
 const FEW_LAMPS: u32 = 8;
+/// With more emitters than this in the scene, the lamps are never all sampled individually.
 const MAX_EMITTERS: u32 = 20_000;
-/// Most emitters of one of many lamps that has samples of its own.
+/// Where lamps are many, most emitters of a lamp that is sampled individually.
 pub(crate) const FEW_EMITTERS: u32 = 24;
-/// Where more than this share of what a receiver sees shines, all lamps have samples of their own, too, in so many groups: the sum over them is
-/// exact, and little of it is hidden, while samples of what is near and large are noisy.
+/// If the lamps' form factor from a receiver exceeds this, all lamps are sampled individually too, in groups: the sum
+/// over them is exact and little of it is hidden, while shared samples of near and large sources are noisy.
 const ENCLOSED: f32 = 0.5;
+/// Most nodes into which all lamps are grouped when they are all sampled individually.
 const MAX_GROUPS: usize = 16;
-/// Of all that may arrive, what a source must bring to have samples of its own, and the most that have where sources are many.
-const OWN_SHARE: f32 = 0.12;
-const MAX_OWN: usize = 3;
-/// Parts are opened while they bring more than this share of all, up to so many.
+/// Where sources are many, the fraction of all estimated light that a source must bring to be sampled individually.
+const INDIVIDUAL_SHARE: f32 = 0.12;
+/// Where sources are many, most sources that are sampled individually.
+const MAX_INDIVIDUAL: usize = 3;
+/// Nodes are opened while they bring more than this fraction of all estimated light.
 const OPENED: f32 = 0.02;
+/// Most nodes in a cut.
 const MAX_BRANCHES: usize = 32;
-/// Parts whose ball appears under a larger sine than this are near: opened while they bring more than this share, as which of their sources
-/// matters differs from receiver to receiver.
+/// Nodes whose bounding sphere appears under a larger sine than this are near. They have lower limits for opening,
+/// since it differs from receiver to receiver which of their sources matter.
 const NEAR: f32 = 0.5;
+/// [`OPENED`] for near nodes.
 const OPENED_NEAR: f32 = 0.005;
+/// [`MAX_BRANCHES`] for near nodes.
 const MAX_NEAR_BRANCHES: usize = 48;
 
-/// A part with about what it brings.
+/// A node with its estimated light.
 #[derive(Clone, Copy, PartialEq)]
 struct Weighted {
     weight: f32,
@@ -129,7 +139,7 @@ impl Eq for Weighted {}
 
 impl Ord for Weighted {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        // The same everywhere, whatever the order in which they came.
+        // A total order, so that the cut does not depend on the order of insertion.
         self.weight.total_cmp(&other.weight).then(other.branch.cmp(&self.branch))
     }
 }
@@ -141,12 +151,13 @@ impl PartialOrd for Weighted {
 }
 
 impl Sources<'_> {
-    /// The cut at receivers within `reach` of one, canonical units. The lamps named in `shared` share samples, however bright they are.
+    /// The cut for all receivers within `reach` (canonical units) of the given one. The lamps in `shared` share
+    /// samples, however bright they are.
     pub fn cut(&self, receiver: &Receiver, reach: f32, shared: &[u32]) -> LightCut {
         let mut cut = LightCut { lights: self.individually_sampled_lights.clone(), ..LightCut::default() };
         let mut roots = Vec::new();
         match self.few_lamps(receiver) {
-            Some(lamps) => (cut.lamps, cut.all_apart) = (lamps, true),
+            Some(lamps) => (cut.lamps, cut.has_all_lamps) = (lamps, true),
             None => roots.extend(self.emitter_tree.root().map(Branch::Emitters)),
         }
         roots.extend(self.light_tree.root().map(Branch::Lights));
@@ -167,27 +178,27 @@ impl Sources<'_> {
                 None => closed.push(node),
             }
         }
-        // What does not arrive at all is left out.
+        // Nodes whose light does not arrive at all are left out.
         closed.retain(|node| node.weight > 0.0);
         closed.sort_unstable_by(|a, b| b.cmp(a));
-        let mut own = 0;
+        let mut individual = 0;
         closed.retain(|node| {
-            let is_own = own < MAX_OWN
-                && node.weight >= OWN_SHARE * total
+            let is_individual = individual < MAX_INDIVIDUAL
+                && node.weight >= INDIVIDUAL_SHARE * total
                 && self.is_single(node.branch)
                 && !matches!(node.branch, Branch::Emitters(lamp) if shared.contains(&lamp));
-            if is_own {
-                own += 1;
+            if is_individual {
+                individual += 1;
                 match node.branch {
                     Branch::Emitters(lamp) => cut.lamps.push(lamp),
                     Branch::Lights(node) => cut.lights.extend(self.light_tree.children(node).err()),
                 }
             }
-            !is_own
+            !is_individual
         });
         cut.lamps.sort_unstable();
         cut.lights.sort_unstable();
-        // In the order of the tree, so that neighbours in the list are neighbours in space.
+        // Tree order, so that neighbours in the list are neighbours in space.
         closed.sort_unstable_by_key(|node| node.branch);
         let sum: f64 = closed.iter().map(|node| f64::from(node.weight)).sum();
         cut.shared.near = closed.iter().any(|node| self.sine(node.branch, receiver, reach) > NEAR);
@@ -207,7 +218,8 @@ impl Sources<'_> {
         cut
     }
 
-    /// All lamps, where they are few, or most of what a receiver sees.
+    /// The nodes of all lamps, if those are to be sampled individually: if they are few, or fill most of what the
+    /// receiver sees.
     fn few_lamps(&self, receiver: &Receiver) -> Option<Vec<u32>> {
         let tree = &self.emitter_tree;
         let Some(root) = tree.root() else { return Some(Vec::new()) };
@@ -215,12 +227,12 @@ impl Sources<'_> {
         if !few || tree.emitters(root) > MAX_EMITTERS {
             return None;
         }
-        let mut found = tree.groups(receiver, MAX_GROUPS);
-        found.sort_unstable();
-        Some(found)
+        let mut groups = tree.groups(receiver, MAX_GROUPS);
+        groups.sort_unstable();
+        Some(groups)
     }
 
-    /// Whether a part can have samples of its own.
+    /// Whether a node is one source that can be sampled individually.
     fn is_single(&self, branch: Branch) -> bool {
         match branch {
             Branch::Emitters(node) => {
@@ -230,7 +242,7 @@ impl Sources<'_> {
         }
     }
 
-    /// The halves of a part that is opened: lamps that can have samples of their own stay whole.
+    /// The two children of a node, if it may be opened: lamps that can be sampled individually stay whole.
     fn halves(&self, branch: Branch) -> Option<[Branch; 2]> {
         match branch {
             Branch::Emitters(_) if self.is_single(branch) => None,
@@ -239,6 +251,10 @@ impl Sources<'_> {
         }
     }
 
+    /// The estimated light of a node; see [`EmitterTree::weight`] and [`LightTree::weight`].
+    ///
+    /// [`EmitterTree::weight`]: super::emitter_tree::EmitterTree::weight
+    /// [`LightTree::weight`]: super::light_tree::LightTree::weight
     fn weight(&self, branch: Branch, receiver: &Receiver, reach: f32) -> f32 {
         match branch {
             Branch::Emitters(node) => self.emitter_tree.weight(node, receiver, reach),
@@ -246,7 +262,7 @@ impl Sources<'_> {
         }
     }
 
-    /// The sine under which a part's ball appears from receivers within `reach` of one, at most 1.
+    /// The largest sine under which a node's bounding sphere appears from receivers within `reach` of the given one.
     fn sine(&self, branch: Branch, receiver: &Receiver, reach: f32) -> f32 {
         match branch {
             Branch::Emitters(node) => self.emitter_tree.sine(node, receiver, reach),

@@ -1,5 +1,5 @@
-//! Everything that shines in a scene: emissive triangles and punctual lights, each in a tree, and the sky. Not the light that a receiver takes
-//! from them: that is `irradiance`.
+//! All light sources of a scene: emissive triangles and punctual lights, each in a tree, and the sky. The light that
+//! they bring to a receiver is computed in `irradiance`.
 
 use std::f32::consts::PI;
 
@@ -8,7 +8,7 @@ use lumbre_optics::LightKind;
 
 use super::emitter_tree::EmitterTree;
 use super::emitters::{Emitter, lamps};
-use super::light_tree::{LightTree, has_place};
+use super::light_tree::{LightTree, has_position};
 use crate::scene::{BakeScene, PlacedLight};
 
 /// The sources of a scene.
@@ -18,28 +18,30 @@ pub(crate) struct Sources<'a> {
     pub(crate) emitter_tree: EmitterTree,
     pub lights: Vec<PlacedLight>,
     pub(crate) light_tree: LightTree,
-    /// Lights that have samples of their own everywhere, by number: those in the sky, and all where they are few.
+    /// Indices of the lights that are sampled individually everywhere: directional lights, and all lights if they are
+    /// few.
     pub(crate) individually_sampled_lights: Vec<u32>,
-    /// Irradiance that a surface gets of an unhidden sky: π times its radiance, W/m². Not direct light here: the rays of the
-    /// form factors and of the final gather find it where they meet nothing.
+    /// Irradiance of a surface under an unoccluded sky: π times the sky's radiance, W/m². The sky is not part of direct
+    /// light: rays of the form factors and of the final gather receive it where they hit nothing.
     pub sky: Vec3,
 }
 
-/// Up to so many lights all have samples of their own: the exact sum over them times the share that is seen is less noisy than samples.
+/// Up to this many lights, all are sampled individually: the exact sum over them times the visible fraction is less
+/// noisy than shared samples.
 pub(crate) const FEW_LIGHTS: usize = 16;
 
 impl<'a> Sources<'a> {
-    /// Of a scene, its emissive triangles, its punctual lights and its sky's radiance.
+    /// Builds the trees over a scene's emissive triangles and punctual lights. `sky` is a radiance.
     pub fn new(scene: &'a BakeScene, emitters: Vec<Emitter>, lights: Vec<PlacedLight>, sky: Vec3) -> Self {
         let emitter_tree = EmitterTree::new(&emitters, &lamps(scene, &emitters));
-        let few = lights.len() <= FEW_LIGHTS;
-        let shares_samples = |index: &u32| !few && has_place(&lights[*index as usize]);
-        let (together, individually_sampled_lights) = (0..lights.len() as u32).partition(shares_samples);
-        let light_tree = LightTree::new(&lights, together, scene.space);
+        let are_few = lights.len() <= FEW_LIGHTS;
+        let shares_samples = |index: &u32| !are_few && has_position(&lights[*index as usize]);
+        let (in_tree, individually_sampled_lights) = (0..lights.len() as u32).partition(shares_samples);
+        let light_tree = LightTree::new(&lights, in_tree, scene.space);
         Self { scene, emitters, emitter_tree, lights, light_tree, individually_sampled_lights, sky: sky * PI }
     }
 
-    /// The emissive triangles among them that are to be kept, and no lights.
+    /// Only the emissive triangles that `keep` accepts, without punctual lights and sky.
     pub fn only_emitters(&self, keep: impl Fn(&Emitter) -> bool) -> Self {
         let emitters: Vec<Emitter> = self.emitters.iter().filter(|emitter| keep(emitter)).cloned().collect();
         let emitter_tree = EmitterTree::new(&emitters, &lamps(self.scene, &emitters));
@@ -54,23 +56,23 @@ impl<'a> Sources<'a> {
         }
     }
 
-    /// Whether nothing shines.
+    /// Whether there is no light source.
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty() && self.lights.is_empty() && !self.has_sky()
     }
 
-    /// Whether the sky shines.
+    /// Whether the sky emits light.
     pub fn has_sky(&self) -> bool {
         self.sky != Vec3::ZERO
     }
 
-    /// The emitters of a part of the emissive surfaces, by number.
+    /// The indices of the emitters of a node of the emitter tree.
     pub fn emitters_of(&self, node: u32) -> &[u32] {
         self.emitter_tree.emitters_of(node)
     }
 }
 
-/// Whether all that shines is inside of rooms: outside of them it is dark. `sky` is its radiance.
+/// Whether all light sources are inside rooms, so that it is dark outside of them. `sky` is a radiance.
 pub(crate) fn shines_inside_only(
     scene: &BakeScene,
     emitters: &[Emitter],
@@ -79,11 +81,11 @@ pub(crate) fn shines_inside_only(
 ) -> bool {
     let inside =
         |points: &[Vec3]| scene.rooms.iter().any(|room| points.iter().all(|&point| room.contains(point)));
-    let light = |placed: &PlacedLight| {
+    let is_light_inside = |placed: &PlacedLight| {
         placed.light.kind != LightKind::Directional && inside(&[scene.space.position(placed.position)])
     };
     !scene.masked
         && sky == Vec3::ZERO
-        && lights.iter().all(light)
+        && lights.iter().all(is_light_inside)
         && emitters.iter().all(|emitter| inside(&emitter.corners))
 }

@@ -1,5 +1,5 @@
-//! What shines: emissive triangles and punctual lights, each in a tree, and the direct light that a receiver takes from them. Not which texels ask:
-//! that is `direct_light`.
+//! Light sources: emissive triangles and punctual lights, each in a tree, and the direct light that they bring to a
+//! receiver. Computing it for every texel is the task of `direct_light`.
 
 pub(crate) mod area_light;
 pub(crate) mod batches;
@@ -18,3 +18,4 @@ pub(crate) mod punctual_irradiance;
 pub(crate) mod receiver_quadrature;
 pub(crate) mod share_variance;
 pub(crate) mod shared_samples;
+pub(crate) mod source_tree;

@@ -1,13 +1,16 @@
-//! Direct light of point, spot and directional lights, by shadow rays where it is not known what stands between. A light with a size is a
-//! sphere, or a disc on the sky, of one radiance; its law of distance and its cone are those of its centre. Not emissive surfaces: those are
-//! `direct`.
+//! Direct light of point, spot and directional lights, by shadow rays where the possible occluders are unknown. A light
+//! with a size is a sphere, or a disc on the sky, of uniform radiance; its attenuation and cone are those of its
+//! centre. Emissive surfaces are in `area_light`.
 
 use glam::{DVec3, Vec3};
 use lumbre_optics::{BakeMode, LightKind};
 
-use super::punctual_irradiance::{PunctualIrradiance, of_center, over_parallelogram, punctual_irradiance};
+use super::punctual_irradiance::{
+    PunctualIrradiance, center_irradiance, over_parallelogram, punctual_irradiance,
+};
 use super::receiver_quadrature::ReceiverQuadrature;
 use super::share_variance::share_variance;
+use crate::color::channel_mean;
 use crate::sampling::{Sequence, cosine_direction, frame};
 use crate::scene::Receiver;
 use crate::scene::{BakeScene, PlacedLight};
@@ -18,44 +21,48 @@ use crate::visibility::cut_out::{GAP, Pieces};
 use crate::visibility::occluders::Visibility;
 use crate::visibility::shadow_clipping::{LightVisibility, ReceiverShape};
 
-/// Numbers of the lights as sources begin here: before it are parts of emissive surfaces.
+/// Offset of the lights' ids in [`VisibilitySummary::add`](super::direct::VisibilitySummary::add); lower ids are nodes
+/// of the emitter tree.
 pub(crate) const FIRST_ID: u32 = 1 << 31;
 
-/// Inside the sphere, or near it, its disc is at most this large: a sine. It bounds what one sample weighs to 1/√(1 - this²) = 7.
+/// Largest sine of the angular radius of a light's disc, for receivers inside the sphere or near it. It bounds the
+/// weight of one sample to 1/√(1 - this²) = 7.
 const LARGEST_SINE: f64 = 0.99;
 
-/// Fewest shadow rays to a near light: a thing the size of its fittings hides much of what it sends, from a small part of the texel.
+/// Fewest shadow rays to a near light: even an object as small as its fittings hides much of its light, from a small
+/// part of the texel.
 const NEAR_SAMPLES: u32 = 64;
 
-/// Of a receiver's side, half of the way from one row of its points to the next.
+/// Half of the distance between two rows of a receiver's sample points, as a fraction of its side.
 const HALF_A_ROW: f32 = 0.125;
 
-/// One light as one sample meets it, per unit of its colour: irradiance.
+/// One sample of a light, as irradiance per unit of the light's colour.
 pub(crate) struct LightSample {
-    /// Of the light's centre, where the receiver faces it.
+    /// Light of the light's centre; 0 if the receiver faces away from it.
     center: f32,
-    /// Of a point of its disc; not above 0 where that is under the receiver's horizon.
+    /// Light of the sampled point of its disc; not above 0 where that is below the receiver's horizon.
     pub disc: f32,
     pub visible: bool,
 }
 
-/// A light at a receiver, by all its samples.
+/// Sums over the samples of one light at a receiver, by batch.
 #[derive(Default)]
 struct LightEstimate {
     center: [f32; BATCHES],
     disc: [f32; BATCHES],
+    /// The part of `disc` that is visible.
     seen: [f32; BATCHES],
     visible: u32,
     hidden: u32,
-    /// Some of the disc is under the horizon.
-    sets: bool,
+    /// Whether some of the disc is below the horizon.
+    crosses_horizon: bool,
 }
 
 impl LightEstimate {
     fn add(&mut self, sample: &LightSample, batch: usize) {
         self.center[batch] += sample.center;
         self.disc[batch] += sample.disc;
-        self.sets |= sample.disc <= 0.0;
+        self.crosses_horizon |= sample.disc <= 0.0;
         if sample.visible {
             self.visible += 1;
             self.seen[batch] += sample.disc;
@@ -64,33 +71,34 @@ impl LightEstimate {
         }
     }
 
-    /// Mean irradiance per unit of colour, and its variance: the light of the centre times the seen share of the disc, which is
-    /// exact in full light and in full shadow; the seen disc's own mean where the horizon cuts it. The light of the centre may be known.
+    /// Mean irradiance per unit of colour, and its variance. This is the light of the centre times the visible fraction
+    /// of the disc, which is exact in full light and in full shadow; where the horizon cuts the disc, it is the mean of
+    /// the visible samples. `known_center` replaces the sampled light of the centre.
     fn mean(&self, samples: u32, known_center: Option<f32>) -> (f32, f32) {
         let samples = samples.max(1) as f32;
         let per_batch = BATCHES as f32 / samples;
         let total = |sums: &[f32; BATCHES]| sums.iter().sum::<f32>();
         let all = total(&self.disc);
-        if self.sets || all <= 0.0 {
+        if self.crosses_horizon || all <= 0.0 {
             return (total(&self.seen) / samples, variance_of_mean(self.seen.map(|sum| sum * per_batch)));
         }
         let center = known_center.unwrap_or(total(&self.center) / samples);
-        let share = total(&self.seen) / all;
-        let of_batch = |batch: usize| match self.disc[batch] > 0.0 {
+        let fraction = total(&self.seen) / all;
+        let batch_fraction = |batch: usize| match self.disc[batch] > 0.0 {
             true => self.seen[batch] / self.disc[batch],
-            false => share,
+            false => fraction,
         };
-        let shares = std::array::from_fn(of_batch);
-        // Where its light is uneven, the seen share is as uncertain as the mean by the samples.
-        let uneven = variance_of_mean(self.center.map(|sum| sum * per_batch));
-        let partly = share_variance(shares, share, self.visible + self.hidden);
-        (center * share, center * center * partly + share * share * uneven)
+        let fractions = std::array::from_fn(batch_fraction);
+        // Where the light varies over the receiver, the mean of the visible part is as uncertain as the samples' mean.
+        let center_variance = variance_of_mean(self.center.map(|sum| sum * per_batch));
+        let fraction_variance = share_variance(fractions, fraction, self.visible + self.hidden);
+        (center * fraction, center * center * fraction_variance + fraction * fraction * center_variance)
     }
 }
 
 impl Sources<'_> {
-    /// Adds the light of some punctual lights, by number, to `direct`: mean over a receiver, by `samples` shadow rays to each; by none to those
-    /// for which it is known what may stand `between`.
+    /// Adds the mean light over a receiver of punctual lights, given by their indices, to `direct`. Casts `samples`
+    /// shadow rays to each light, but none to lights whose possible occluders `visibility` knows.
     pub(crate) fn punctual(
         &self,
         lights: &[u32],
@@ -105,6 +113,7 @@ impl Sources<'_> {
         }
     }
 
+    /// Adds the light of one punctual light.
     fn light_irradiance(
         &self,
         index: u32,
@@ -134,13 +143,14 @@ impl Sources<'_> {
         match placed.light.bake {
             BakeMode::Static => {
                 direct.baked += color * mean;
-                direct.variance += (color.element_sum() / 3.0).powi(2) * variance;
+                direct.variance += channel_mean(color).powi(2) * variance;
             }
             BakeMode::Mixed | BakeMode::Dynamic => direct.mixed += color * mean,
         }
     }
 
-    /// Of a light without size that is near a receiver on a plane the mean over all of it, whatever lies between.
+    /// Mean irradiance over a whole parallelogram receiver by a near light without size, ignoring occlusion; `None` if
+    /// [`over_parallelogram`] does not apply.
     fn near_field_mean(
         &self,
         light: &PlacedLight,
@@ -150,8 +160,8 @@ impl Sources<'_> {
         over_parallelogram(self.scene, light, visibility.square.as_ref()?, &point(0.5, 0.5)?)
     }
 
-    /// Mean irradiance of a light per unit of its colour, and its variance, by samples; by no rays if all is `clear`, and that of its `center`
-    /// as it is known, if it is.
+    /// Mean irradiance by a light per unit of its colour, and its variance, estimated by samples. Casts no rays if the
+    /// light is known to be `clear`; `center` is the unoccluded mean of its centre's light, if known.
     fn by_shadow_rays(
         &self,
         index: u32,
@@ -162,26 +172,28 @@ impl Sources<'_> {
         direct: &mut Direct,
     ) -> (f32, f32) {
         let light = &self.lights[index as usize];
-        let mut sum = LightEstimate::default();
+        let mut estimate = LightEstimate::default();
         let sequence = sequence.of(1 + index);
-        let sized = light.is_sized();
+        let is_sized = light.is_sized();
         let samples = if center.is_some() && !clear { samples.max(NEAR_SAMPLES) } else { samples };
         for sample in 0..samples {
             let [a, b, c, d] = sequence.point(sample, 0);
-            let (x, y, u, v) = if sized { (c, d, a, b) } else { (a, b, c, d) };
+            let (x, y, u, v) = if is_sized { (c, d, a, b) } else { (a, b, c, d) };
             let Some(receiver) = point(x, y) else { continue };
             if let Some(sampled) = sample_light(self.scene, light, &receiver, (u, v), clear) {
-                sum.add(&sampled, batch_of(sample, samples));
+                estimate.add(&sampled, batch_of(sample, samples));
             }
         }
-        direct.rays += if clear { 0 } else { sum.visible + sum.hidden };
-        direct.sampled |= !clear || sum.sets;
-        direct.seen.add(FIRST_ID + index, sum.visible, sum.hidden);
-        // Of a near light a shadow takes what the few samples in it do not tell.
-        sum.mean(samples, center.filter(|_| sum.hidden == 0))
+        direct.rays += if clear { 0 } else { estimate.visible + estimate.hidden };
+        direct.sampled |= !clear || estimate.crosses_horizon;
+        direct.seen.add(FIRST_ID + index, estimate.visible, estimate.hidden);
+        // The light of a near light varies strongly over the receiver, so the known mean does not apply to its lit part
+        // alone.
+        estimate.mean(samples, center.filter(|_| estimate.hidden == 0))
     }
 
-    /// The same for a light without size, exactly but for what differs within a lit piece of the receiver.
+    /// The same for a light without size whose visibility is known. Shadows are exact; the light is approximated as
+    /// constant within each lit piece of the receiver.
     fn past_shadows(
         &self,
         index: u32,
@@ -191,21 +203,21 @@ impl Sources<'_> {
         direct: &mut Direct,
     ) -> (f32, f32) {
         let light = &self.lights[index as usize];
-        let arriving = |receiver: &Receiver| of_center(self.scene, light, receiver);
+        let arriving = |receiver: &Receiver| center_irradiance(self.scene, light, receiver);
         let by_points = || ReceiverQuadrature::mean(|x, y| Some(Vec3::splat(arriving(&point(x, y)?))));
-        let open = || match self.near_field_mean(light, visibility, point) {
+        let unoccluded = || match self.near_field_mean(light, visibility, point) {
             Some(mean) => (Vec3::splat(mean), 0.0),
             None => by_points(),
         };
         let (LightVisibility::Shadows(origin, shadows), Some(shape)) = (known, &visibility.receiver_shape)
         else {
             direct.seen.add(FIRST_ID + index, 1, 0);
-            let (open, variance) = open();
-            return (open.x, variance);
+            let (mean, variance) = unoccluded();
+            return (mean.x, variance);
         };
         let Some(middle) = point(0.5, 0.5) else { return (0.0, 0.0) };
-        let (mut sum, mut lit, mut room) = (0.0, 0.0, Pieces::new());
-        let exact = origin.lit(shape, shadows, &mut room, |place: DVec3, share| {
+        let (mut sum, mut lit, mut pieces) = (0.0, 0.0, Pieces::new());
+        let is_exact = origin.lit(shape, shadows, &mut pieces, |place: DVec3, share| {
             sum += share * f64::from(arriving(&Receiver { position: place.as_vec3(), ..middle }));
             lit += share;
         });
@@ -214,26 +226,30 @@ impl Sources<'_> {
         if lit == 0.0 {
             return (0.0, 0.0);
         }
-        // Of a near light a shadow takes what no piece's middle tells.
-        let (open, variance) = if hidden == 0 { open() } else { by_points() };
-        // Pieces have one point each, all of the receiver several.
-        let whole = arriving(&middle);
+        // The exact mean of a near light is dominated by the points closest to it, which a shadow may cover.
+        let (open, variance) = if hidden == 0 { unoccluded() } else { by_points() };
+        // `sum` samples each piece at one point; scale it by the ratio of the better unoccluded mean to the light at
+        // the middle.
+        let at_middle = arriving(&middle);
         let mean = match shape {
-            ReceiverShape::Parallelogram(_) if whole > 0.0 => open.x * (sum / f64::from(whole)) as f32,
+            ReceiverShape::Parallelogram(_) if at_middle > 0.0 => {
+                open.x * (sum / f64::from(at_middle)) as f32
+            }
             _ => sum as f32,
         };
-        // Of points in four rows or more, an edge is off by half a row at most.
-        let of_edges = if hidden > 0 && !exact { (open.x * HALF_A_ROW).powi(2) / 3.0 } else { 0.0 };
-        (mean, variance * lit * lit + of_edges)
+        // With points in four rows or more, a shadow edge is off by half a row at most.
+        let edge_variance = if hidden > 0 && !is_exact { (open.x * HALF_A_ROW).powi(2) / 3.0 } else { 0.0 };
+        (mean, variance * lit * lit + edge_variance)
     }
 }
 
-/// What a point of a receiver gets of a light whose disc is sampled at (u, v) of the unit square; `None` where it gets nothing
-/// whatever lies between. If all is `clear`, nothing does.
+/// Samples a light at a receiver, with (u, v) of the unit square choosing a point of its disc. `None` if the light
+/// brings nothing there even without occluders. If `clear`, there are no occluders and no shadow ray is cast.
 ///
-/// The disc is that of directions within the sphere's silhouette, sin θ = radius / distance, sampled evenly in its projection onto
-/// the plane across the axis to its centre. With ω the direction, E = strength · ⟨V n·ω / a·ω⟩: a sphere of one radiance gives
-/// exactly n·a where it is whole above the horizon, as a point does.
+/// The disc contains the directions within the sphere's silhouette, sin θ = radius / distance. It is sampled uniformly
+/// in its projection onto the plane perpendicular to the axis towards the light's centre. With ω the direction, a the
+/// axis and V the visibility, E = strength · ⟨V n·ω / a·ω⟩: a sphere of uniform radiance that is entirely above the
+/// horizon gives exactly n·a, as a point does.
 pub(crate) fn sample_light(
     scene: &BakeScene,
     placed: &PlacedLight,
@@ -259,7 +275,7 @@ pub(crate) fn sample_light(
         let [x, y] = frame(axis.as_vec3()).map(|side| side.as_dvec3());
         let disc = cosine_direction(u, v).as_dvec3() * sine;
         along = (1.0 - disc.x * disc.x - disc.y * disc.y).max(0.0).sqrt();
-        // `frame` is orthonormal to f32: what is left of the axis in it is taken out.
+        // `frame` is orthonormal only to f32 precision, so its remaining component along the axis is removed.
         let across = x * disc.x + y * disc.y;
         direction = (axis * along + (across - axis * across.dot(axis))).normalize_or(axis);
     }
@@ -277,7 +293,7 @@ pub(crate) fn sample_light(
     } else if directional {
         scene.blocked_towards(receiver.origin, direction.as_vec3())
     } else {
-        // Up to where the sphere begins: what is inside it, its bulb, hides nothing.
+        // The ray ends at the sphere's surface: geometry inside it, such as a bulb, does not block its light.
         let across = direction.cross(axis).length() * distance;
         let depth = (f64::from(light.radius).powi(2) - across * across).max(0.0).sqrt();
         let reach = (distance * direction.dot(axis) - depth).max(0.0);

@@ -1,4 +1,4 @@
-//! What a point, spot or directional light sends to a point, whatever lies between. Not its shadows: those are `punctual`'s.
+//! Unoccluded light that a point, spot or directional light sends to a point. Shadows are in `punctual`.
 
 use std::f64::consts::PI;
 
@@ -9,17 +9,17 @@ use crate::scene::Receiver;
 use crate::scene::{BakeScene, PlacedLight};
 use crate::visibility::solid_angle::of_parallelogram;
 
-/// What arrives at a point from a light, whatever lies between.
+/// Light that arrives at a point from a light, ignoring occlusion.
 pub(crate) struct PunctualIrradiance {
-    /// Towards its centre.
+    /// Unit vector towards the light's centre.
     pub axis: DVec3,
-    /// Metres; infinite for directional lights.
+    /// Distance in metres; infinite for directional lights.
     pub distance: f64,
-    /// Irradiance across the axis, per unit of its colour.
+    /// Irradiance on a surface perpendicular to the axis, per unit of the light's colour.
     pub strength: f64,
 }
 
-/// `None` where nothing arrives.
+/// The light that arrives at a canonical position; `None` if there is none.
 pub(crate) fn punctual_irradiance(
     scene: &BakeScene,
     placed: &PlacedLight,
@@ -28,15 +28,15 @@ pub(crate) fn punctual_irradiance(
     let light = &placed.light;
     let position = scene.space.world(position);
     let arriving = evaluate_light(light, placed.position, placed.axis, position);
-    let directional = light.kind == LightKind::Directional;
-    let distance = if directional { f64::INFINITY } else { placed.position.distance(position) };
-    let weakened = if directional { arriving.attenuation } else { attenuation(light, distance) };
-    let strength = PI * weakened * arriving.spot;
+    let is_directional = light.kind == LightKind::Directional;
+    let distance = if is_directional { f64::INFINITY } else { placed.position.distance(position) };
+    let attenuation = if is_directional { arriving.attenuation } else { attenuation(light, distance) };
+    let strength = PI * attenuation * arriving.spot;
     (strength > 0.0).then_some(PunctualIrradiance { axis: arriving.direction, distance, strength })
 }
 
-/// Irradiance by a light without size, per unit of its colour, whatever lies between.
-pub(crate) fn of_center(scene: &BakeScene, placed: &PlacedLight, receiver: &Receiver) -> f32 {
+/// Unoccluded irradiance by the centre of a light, per unit of the light's colour.
+pub(crate) fn center_irradiance(scene: &BakeScene, placed: &PlacedLight, receiver: &Receiver) -> f32 {
     let Some(PunctualIrradiance { axis, strength, .. }) =
         punctual_irradiance(scene, placed, receiver.position)
     else {
@@ -49,16 +49,19 @@ pub(crate) fn of_center(scene: &BakeScene, placed: &PlacedLight, receiver: &Rece
     if light.is_finite() { light } else { 0.0 }
 }
 
-/// Of the side of a parallelogram, how far a light may be from its middle to count as near: beyond, a few points tell the mean to 0.02 %.
+/// Distance from a parallelogram's middle up to which a light counts as near, relative to the parallelogram's side. For
+/// lights further away, a few points give the mean to 0.02 %.
 const NEAR: f64 = 4.0;
 
-/// Of a light's range, how far all of it may be from the light: there the window is above 0.998.
+/// Largest distance from the light to a corner, relative to the light's range; up to here the attenuation window is
+/// above 0.998.
 const WELL_IN_RANGE: f64 = 0.2;
 
-/// The mean over a parallelogram (its corners one after the other, canonical units) of a near light without size, per unit of its colour, whatever
-/// lies between: what a law of inverse squares sends through a surface is its solid angle, however close the light is. The window of a
-/// range and what a smooth normal differs by are those of the point nearest to the light, where most of it falls. `None` for other laws, for
-/// cones, for ranges that end not far beyond, and for lights that are not near.
+/// Mean unoccluded irradiance over a parallelogram by a near light without size, per unit of the light's colour. With
+/// inverse-square attenuation, the flux through a surface is proportional to its solid angle, however close the light
+/// is. The attenuation window and the cosine of a smooth normal are taken at the point nearest to the light, which
+/// receives most of the light. `None` for other attenuations, for spot lights, if the range ends not far beyond, and if
+/// the light is not near. `corners` are in order around the parallelogram, in canonical units.
 pub(crate) fn over_parallelogram(
     scene: &BakeScene,
     placed: &PlacedLight,
@@ -82,7 +85,7 @@ pub(crate) fn over_parallelogram(
     if farthest > WELL_IN_RANGE * f64::from(law.range) * scene.space.scale {
         return None;
     }
-    // The light's foot, or the nearest to it that there is.
+    // The foot of the perpendicular from the light, or the parallelogram's point nearest to it.
     let [u, v] =
         [along, across].map(|edge| (0.5 - to_middle.dot(edge) / edge.length_squared()).clamp(0.0, 1.0));
     let nearest = Receiver { position: (corners[0] + along * u + across * v).as_vec3(), ..*middle };
@@ -100,8 +103,9 @@ pub(crate) fn over_parallelogram(
     mean.is_finite().then_some(mean)
 }
 
-/// A light's factor at a distance in metres, without the floor that a frame sets at a centimetre: a model of a few centimetres has the
-/// light of one of metres. At the light itself the floor counts.
+/// A light's attenuation at a distance in metres, without the renderer's lower bound of a centimetre on the distance,
+/// so that a model of a few centimetres is lit like one of metres. The bound applies only where the result would not be
+/// finite.
 pub(crate) fn attenuation(light: &Light, distance: f64) -> f64 {
     let law = &light.attenuation;
     let [constant, linear, quadratic] = law.coefficients().as_dvec3().to_array();

@@ -1,13 +1,16 @@
-//! The variance of the part of a source that is seen, from batches of shadow samples. Not the sampling.
+//! The variance of a source's visible fraction, from batches of shadow samples. The samples are drawn elsewhere.
 
 use crate::sources::batches::{BATCHES, variance_of_mean};
 
-/// Variance of the mean of `samples` shadow samples over batches that saw these shares, `mean` together.
+/// Variance of the visible fraction `mean` of `samples` shadow samples, whose batches have the visible fractions
+/// `shares`.
 ///
-/// Batches of a few samples see one of a few shares, n/16 say, and an even edge often shows the same to all four: their spread is then 0, and
-/// whoever stops by it stops by luck, with an error of a whole sample. So it is at least what an edge leaves when its samples are as evenly
-/// spread as they can be: of √N strata that it crosses, each is in light or not with a variance of 1/6 on average (p (1 - p) over even p),
-/// which is about N^-3/2 / 5 where the edge crosses the whole disc, and less by its chord, √(4 s (1 - s)), where it cuts off a share s.
+/// A batch of few samples can only have one of a few fractions, n/16 say, and at a straight edge all four batches often
+/// have the same. Their spread is then 0 by chance, although the error may be as large as a whole sample. The variance
+/// is therefore at least what an edge leaves when the samples are distributed as evenly as possible: the edge crosses
+/// √N strata, each of which is lit or not with a variance of 1/6 on average (the mean of p (1 - p) over uniform p).
+/// This gives about N^-3/2 / 5 for an edge across the whole disc, times the length of its chord, √(4 s (1 - s)), if it
+/// cuts off a fraction s.
 pub(crate) fn share_variance(shares: [f32; BATCHES], mean: f32, samples: u32) -> f32 {
     let spread = variance_of_mean(shares);
     if !(mean > 0.0 && mean < 1.0) {
@@ -17,14 +20,16 @@ pub(crate) fn share_variance(shares: [f32; BATCHES], mean: f32, samples: u32) ->
     spread.max(EDGE * chord * (samples.max(1) as f32).powf(-1.5))
 }
 
-/// Variance of the mean of light at so many points of a receiver, by batches of them, that differs by `range`: at least what an edge leaves that
-/// goes right across, with all of the range between its sides.
+/// Variance of the mean light at `points` points of a receiver, from the means of their batches. It is at least what a
+/// shadow edge across the whole receiver leaves, if the light differs by `range` (largest minus smallest light) between
+/// its two sides.
 pub(crate) fn uneven_variance(means: [f32; BATCHES], range: f32, points: u32) -> f32 {
     let edge = EDGE * range * range * (points.max(1) as f32).powf(-1.5);
     variance_of_mean(means).max(edge)
 }
 
-/// Strata that a diameter crosses over √N, 1.13 sides of the square that the disc is mapped from, times 1/6.
+/// Number of strata that a diameter crosses, divided by √N (1.13 sides of the square that is mapped to the disc), times
+/// 1/6.
 const EDGE: f32 = 0.19;
 
 #[cfg(test)]
@@ -32,8 +37,9 @@ mod tests {
     use super::*;
     use crate::sampling::{Sequence, Stream, cosine_direction};
 
-    /// Of many replicates, the mean squared error of the share that a chord cuts off the disc, and the mean of what is stated for it.
-    fn of_chord(height: f32, samples: u32) -> (f64, f64, usize) {
+    /// Estimates the fraction of a disc beyond a chord in many replicates. Returns the mean squared error, the mean
+    /// stated variance, and the number of replicates whose batches all agree.
+    fn chord_errors(height: f32, samples: u32) -> (f64, f64, usize) {
         let exact =
             f64::from((height.acos() - height * (1.0 - height * height).sqrt()) / std::f32::consts::PI);
         let (mut squares, mut stated, mut none) = (0.0, 0.0, 0);
@@ -43,7 +49,7 @@ mod tests {
             let mut batches = [0.0f32; BATCHES];
             for sample in 0..samples {
                 let [u, v, ..] = sequence.point(sample, 0);
-                // An edge along neither axis of the square.
+                // The edge is parallel to neither axis of the square.
                 let disc = cosine_direction(u, v);
                 let seen = disc.x * 0.8 + disc.y * 0.6 > height;
                 batches[(sample * BATCHES as u32 / samples) as usize] += f32::from(u8::from(seen));
@@ -58,17 +64,17 @@ mod tests {
     }
 
     #[test]
-    fn no_penumbra_is_stated_to_be_without_error() {
+    fn the_stated_variance_of_a_penumbra_covers_its_error() {
         let mut without = 0;
         for height in [0.0, 0.3, 0.7] {
             for samples in [16, 64, 256, 1024] {
-                let (squared, stated, none) = of_chord(height, samples);
+                let (squared, stated, none) = chord_errors(height, samples);
                 println!(
                     "{height} {samples}: error {squared:.2e}, stated {stated:.2e}, batches that agree {none}"
                 );
                 without += none;
-                // What is stated is no less than what is there, and no wild exaggeration: four batches and their double counting bring
-                // it to some times as much.
+                // The stated variance must cover the squared error but not exceed it wildly: few batches and their
+                // safety factor make it a few times as large.
                 assert!(
                     stated > squared && stated < 8.0 * squared,
                     "{height} {samples}: {squared:e} {stated:e}"

@@ -1,6 +1,6 @@
-//! The light of sources that share samples: each sample draws one of them, about in proportion to what it may bring, and one point of it, and
-//! casts one shadow ray. What a sample takes is the same for ten sources and for ten thousand. Not which sources those are: that is
-//! `light_cut`.
+//! The light of sources that share samples. Each sample chooses one source, about in proportion to the light that it
+//! may bring, and a point on it, and casts one shadow ray, so the cost of a sample hardly depends on the number of
+//! sources. `light_cut` decides which sources share samples.
 
 use glam::Vec3;
 use lumbre_optics::BakeMode;
@@ -8,6 +8,7 @@ use lumbre_optics::BakeMode;
 use super::emitter_walk::EmitterChoice;
 use super::light_cut::{Branch, SharedSources};
 use super::punctual::{self, FIRST_ID};
+use crate::color::channel_mean;
 use crate::sampling::Sequence;
 use crate::scene::Receiver;
 use crate::sources::batches::{BATCHES, batch_of, variance_of_mean};
@@ -15,26 +16,28 @@ use crate::sources::direct::Direct;
 use crate::sources::emitter_sample::sample_emitter;
 use crate::sources::light_sources::Sources;
 
-/// What one sample found: irradiance, W/m², over the probability of the choice.
+/// The estimate by one sample: irradiance, W/m², divided by the probability of the source.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct SourceSample {
-    /// Of emissive triangles and static lights.
+    /// From emissive triangles and static lights.
     pub baked: Vec3,
-    /// Of mixed lights.
+    /// From mixed lights.
     pub mixed: Vec3,
-    /// Whether a shadow ray was cast, and whether it found the source hidden.
-    pub asked: bool,
+    /// Whether the sample counts as a shadow ray.
+    pub has_ray: bool,
+    /// Whether the source is hidden.
     pub hidden: bool,
-    /// 1 / distance to the point, canonical units; 0 where it could bring nothing.
+    /// 1 / distance to the source's point, canonical units; 0 if it could bring no light.
     pub inverse_distance: f32,
 }
 
-/// The dimension sets of such samples: where on the receiver, and where on which source.
+/// Dimension set for the point on the receiver.
 const PLACE_SET: u32 = 32;
+/// Dimension set for the choice of the source and the point on it.
 const SOURCE_SET: u32 = 33;
 
 impl Sources<'_> {
-    /// One sample at a receiver by three numbers in [0, 1): which source, and where on it.
+    /// One sample at a receiver by three numbers in [0, 1): the first chooses the source, the others the point on it.
     pub fn sample(
         &self,
         shared: &SharedSources,
@@ -58,7 +61,7 @@ impl Sources<'_> {
                 let hidden = self.is_occluded(emitter, &sample, receiver);
                 let baked = if hidden { Vec3::ZERO } else { light };
                 let inverse_distance = sample.distance.max(f32::MIN_POSITIVE).recip();
-                SourceSample { baked, mixed: Vec3::ZERO, asked: true, hidden, inverse_distance }
+                SourceSample { baked, mixed: Vec3::ZERO, has_ray: true, hidden, inverse_distance }
             }
             Branch::Lights(node) => {
                 let Some((light, probability)) = self.light_tree.pick(node, receiver, choice) else {
@@ -77,12 +80,13 @@ impl Sources<'_> {
                     BakeMode::Mixed | BakeMode::Dynamic => (Vec3::ZERO, light),
                 };
                 let inverse_distance = distance.max(f32::MIN_POSITIVE).recip();
-                SourceSample { baked, mixed, asked: true, hidden: !sampled.visible, inverse_distance }
+                SourceSample { baked, mixed, has_ray: true, hidden: !sampled.visible, inverse_distance }
             }
         }
     }
 
-    /// Adds the mean irradiance of a receiver by so many samples; `point` maps the unit square onto its surface.
+    /// Adds the mean irradiance of a receiver by the shared sources, estimated by `samples` samples, to `direct`.
+    /// `point` maps the unit square onto the receiver's surface.
     pub(crate) fn add_shared_light(
         &self,
         shared: &SharedSources,
@@ -101,16 +105,16 @@ impl Sources<'_> {
             let [x, y, ..] = sequence.point(sample, PLACE_SET);
             let Some(receiver) = point(x, y) else { continue };
             let [choice, u, v, _] = sequence.point(sample, SOURCE_SET);
-            let found = self.sample(shared, &receiver, [choice, u, v]);
-            direct.baked += found.baked * per_sample;
-            direct.mixed += found.mixed * per_sample;
-            batches[batch_of(sample, samples)] += found.baked.element_sum() / 3.0;
-            visible += u32::from(found.asked && !found.hidden);
-            hidden += u32::from(found.hidden);
+            let light = self.sample(shared, &receiver, [choice, u, v]);
+            direct.baked += light.baked * per_sample;
+            direct.mixed += light.mixed * per_sample;
+            batches[batch_of(sample, samples)] += channel_mean(light.baked);
+            visible += u32::from(light.has_ray && !light.hidden);
+            hidden += u32::from(light.hidden);
         }
         direct.rays += visible + hidden;
         direct.sampled = true;
-        // Which sources these are differs from receiver to receiver: only a part tells of a shadow.
+        // The shared sources differ from receiver to receiver, so they are summarised under one id.
         direct.seen.add(FIRST_ID - 1, visible, hidden);
         direct.variance += variance_of_mean(batches.map(|sum| sum * per_sample * BATCHES as f32));
     }

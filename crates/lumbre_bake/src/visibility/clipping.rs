@@ -1,44 +1,45 @@
-//! The part of a convex polygon on one side of a line or plane (Sutherland and Hodgman, "Reentrant Polygon Clipping", 1974), and the part of a
-//! segment in a polygon. Not both sides of a cut at once, in room that is reused: that is `cut_out`.
+//! Clips a convex polygon to one side of a line or plane (Sutherland and Hodgman, "Reentrant Polygon Clipping", 1974),
+//! and a segment to a polygon. `cut_out` keeps both sides of a cut, in reused memory.
 
 use glam::{DVec2, DVec3};
 
 /// A corner, in the plane or in space.
 pub(crate) trait Corner: Copy {
-    /// The point at a share of the way to another.
-    fn towards(self, other: Self, share: f64) -> Self;
+    /// The point at fraction `t` of the way to `other`.
+    fn towards(self, other: Self, t: f64) -> Self;
 }
 
 impl Corner for DVec2 {
-    fn towards(self, other: Self, share: f64) -> Self {
-        self.lerp(other, share)
+    fn towards(self, other: Self, t: f64) -> Self {
+        self.lerp(other, t)
     }
 }
 
 impl Corner for DVec3 {
-    fn towards(self, other: Self, share: f64) -> Self {
-        self.lerp(other, share)
+    fn towards(self, other: Self, t: f64) -> Self {
+        self.lerp(other, t)
     }
 }
 
-/// Calls `keep` for the corners, in their order, of the part of a convex polygon that is not below a height of 0.
+/// Clips a convex polygon to the points whose `height` is not below 0. Calls `keep` for each corner of the result, in
+/// order.
 pub(crate) fn clip<C: Corner>(corners: &[C], height: impl Fn(C) -> f64, mut keep: impl FnMut(C)) {
     let Some(&first) = corners.first() else { return };
-    let mut own = height(first);
+    let mut here = height(first);
     for (place, &corner) in corners.iter().enumerate() {
         let next = corners[(place + 1) % corners.len()];
-        let beyond = height(next);
-        if own >= 0.0 {
+        let there = height(next);
+        if here >= 0.0 {
             keep(corner);
         }
-        if (own > 0.0 && beyond < 0.0) || (own < 0.0 && beyond > 0.0) {
-            keep(corner.towards(next, own / (own - beyond)));
+        if (here > 0.0 && there < 0.0) || (here < 0.0 && there > 0.0) {
+            keep(corner.towards(next, here / (here - there)));
         }
-        own = beyond;
+        here = there;
     }
 }
 
-/// The part of a segment in a counter-clockwise convex polygon.
+/// The part of a segment inside a counter-clockwise convex polygon.
 pub(crate) fn clip_segment(polygon: &[DVec2], [p, q]: [DVec2; 2]) -> Option<[DVec2; 2]> {
     let (mut from, mut to) = (0.0f64, 1.0f64);
     for (place, &a) in polygon.iter().enumerate() {
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_on_the_plane_stay_once() {
+    fn corners_on_the_plane_appear_once() {
         let part = |height: &dyn Fn(DVec2) -> f64| {
             let mut corners = Vec::new();
             clip(&TRIANGLE, height, |corner| corners.push(corner));

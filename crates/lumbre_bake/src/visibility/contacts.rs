@@ -1,5 +1,6 @@
-//! Contact lines: where other surfaces stand on a triangle or pass through it, and the outlines of what lies on it. Light differs from
-//! one side of such a line to the other, however small a patch is. Not the cutting of patches along them: that is `bsp`.
+//! Contact lines on a triangle: where other surfaces stand on it or pass through it, and the outlines of surfaces that
+//! lie on it. The light changes abruptly across such a line, however small the patches are. `radiosity::bsp` cuts
+//! patches along them.
 
 use std::collections::HashMap;
 
@@ -7,7 +8,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::scene::{BakeScene, SceneTriangle};
 
-/// A frame in the plane of a triangle: origin at its first corner, unit axes.
+/// A coordinate frame in the plane of a triangle, with its origin at the first corner and unit axes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlaneFrame {
     origin: DVec3,
@@ -24,33 +25,35 @@ impl PlaneFrame {
         Self { origin: a, right, up: normal.cross(right), normal }
     }
 
-    /// A point's place in the plane.
+    /// The coordinates of a point's projection onto the plane.
     pub fn flat(&self, point: DVec3) -> DVec2 {
         let d = point - self.origin;
         DVec2::new(d.dot(self.right), d.dot(self.up))
     }
 
+    /// Signed distance of a point from the plane.
     fn height(&self, point: DVec3) -> f64 {
         (point - self.origin).dot(self.normal)
     }
 }
 
-/// What hovers above a patch by less than this share of its side stands or lies on it.
+/// Height above a patch, as a fraction of the patch's side, up to which a surface counts as standing or lying on it.
 const REACH: f64 = 0.1;
-/// The height at which what stands on a triangle is cut, as a share of that: above the rounding of its corners.
+/// Height at which a surface that stands on a triangle is intersected, as a fraction of the reach: above the rounding
+/// error of its corners.
 const LEVEL: f64 = 1.0 / 64.0;
-/// Cosine between the normals of surfaces above which one lies on the other instead of standing on it.
+/// Cosine between the normals of two surfaces above which one lies on the other instead of standing on it.
 const LYING: f64 = 0.98;
 
-/// The segments in which others meet a triangle's plane near it, in that plane's frame; what is `side` wide counts as a patch. A mesh's next
-/// triangle, beyond an edge that both share, meets it nowhere else.
+/// The contact lines of other triangles on triangle `index`, as segments in `frame`, the frame of its plane. `side` is
+/// the side of a patch. Adjacent triangles of a mesh, which share an edge, make no contact.
 pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: f32) -> Vec<[DVec2; 2]> {
     let triangle = &scene.triangles[index as usize];
     let reach = REACH * f64::from(side);
     let [a, b, c] = triangle.corners;
     let margin = Vec3::splat(reach as f32);
     let (low, high) = (a.min(b).min(c) - margin, a.max(b).max(c) + margin);
-    let mut found = Vec::new();
+    let mut lines = Vec::new();
     let mut outlines: HashMap<[[u32; 3]; 2], Option<[DVec2; 2]>> = HashMap::new();
     scene.boxes.near(low, high, |other| {
         let other_triangle = &scene.triangles[other as usize];
@@ -60,9 +63,9 @@ pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: 
         let corners = other_triangle.corners.map(|corner| corner.as_dvec3());
         let cosine = f64::from(other_triangle.normal.dot(triangle.normal));
         if cosine.abs() <= LYING {
-            // What rises from one of its edges stands beside it and not on it.
+            // A triangle that shares an edge with it stands beside it and not on it.
             if common_corners(&triangle.corners, &other_triangle.corners) < 2 {
-                found.extend(contact(frame, &corners, reach, triangle.two_sided));
+                lines.extend(contact(frame, &corners, reach, triangle.two_sided));
             }
         } else if lies_on(frame, &corners, reach, cosine, triangle.two_sided) {
             for i in 0..3 {
@@ -70,7 +73,7 @@ pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: 
                 let mut ends = [other_triangle.corners[a], other_triangle.corners[b]]
                     .map(|p| p.to_array().map(f32::to_bits));
                 ends.sort_unstable();
-                // An edge that two share is not on the outline.
+                // An edge that two triangles share is not on the outline.
                 let line = [frame.flat(corners[a]), frame.flat(corners[b])];
                 outlines.entry(ends).and_modify(|line| *line = None).or_insert(Some(line));
             }
@@ -78,16 +81,17 @@ pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: 
     });
     let mut outlines: Vec<_> = outlines.into_iter().filter_map(|(ends, line)| Some((ends, line?))).collect();
     outlines.sort_unstable_by_key(|(ends, _)| *ends);
-    found.extend(outlines.into_iter().map(|(_, line)| line));
-    found
+    lines.extend(outlines.into_iter().map(|(_, line)| line));
+    lines
 }
 
-/// How many corners of a triangle are in one place with one of another's, bit by bit.
-fn common_corners(own: &[Vec3; 3], other: &[Vec3; 3]) -> usize {
-    own.iter().filter(|corner| other.contains(corner)).count()
+/// Number of corners that two triangles have in common, with exactly equal coordinates.
+fn common_corners(first: &[Vec3; 3], second: &[Vec3; 3]) -> usize {
+    first.iter().filter(|corner| second.contains(corner)).count()
 }
 
-/// Whether a triangle about parallel to a plane lies on it, and is no part of the same surface.
+/// Whether a triangle that is about parallel to the plane lies on it without being part of the same surface. `cosine`
+/// is that between the normals.
 fn lies_on(frame: &PlaneFrame, corners: &[DVec3; 3], reach: f64, cosine: f64, both_sides: bool) -> bool {
     let mut heights = corners.map(|corner| frame.height(corner));
     if both_sides && heights.iter().sum::<f64>() < 0.0 {
@@ -98,7 +102,9 @@ fn lies_on(frame: &PlaneFrame, corners: &[DVec3; 3], reach: f64, cosine: f64, bo
     heights.iter().all(|&height| (-margin..=reach).contains(&height)) && (cosine < 0.0 || !coplanar)
 }
 
-/// Where a triangle is cut at the height of a plane, or just above its lowest point if that is at most `reach` over the plane.
+/// The segment in which a triangle crosses the plane, or, if its lowest point is at most `reach` above the plane, in
+/// which it is cut just above that point. With `both_sides`, a triangle below the plane is treated as its mirror image
+/// above it.
 fn contact(frame: &PlaneFrame, corners: &[DVec3; 3], reach: f64, both_sides: bool) -> Option<[DVec2; 2]> {
     let mut heights = corners.map(|corner| frame.height(corner));
     let margin = reach * LEVEL;
@@ -129,23 +135,23 @@ fn contact(frame: &PlaneFrame, corners: &[DVec3; 3], reach: f64, both_sides: boo
 mod tests {
     use super::*;
 
-    fn ground() -> PlaneFrame {
+    fn horizontal_plane() -> PlaneFrame {
         PlaneFrame { origin: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, normal: DVec3::Z }
     }
 
     #[test]
-    fn what_stands_hovers_a_little_or_passes_through_makes_contact() {
+    fn surfaces_that_stand_on_hover_just_above_or_cross_the_plane_make_contact() {
         let wall = |z: f64| [DVec3::new(0.0, 1.0, z), DVec3::new(2.0, 1.0, z), DVec3::new(0.0, 1.0, z + 1.0)];
         for (z, expected) in [(0.0, 2.0), (0.005, 2.0), (-0.5, 1.0)] {
-            let [p, q] = contact(&ground(), &wall(z), 0.01, false).expect("it meets the ground");
+            let [p, q] = contact(&horizontal_plane(), &wall(z), 0.01, false).expect("it meets the plane");
             assert!((p.y - 1.0).abs() < 1e-12 && (q.y - 1.0).abs() < 1e-12);
-            // Cut a little above its lowest points, where it is narrower by as little.
+            // It is cut slightly above its lowest points, where it is slightly narrower.
             assert!((p.distance(q) - expected).abs() < 0.01 && p.x.min(q.x).abs() < 0.01, "{z}: {p} {q}");
         }
-        assert_eq!(contact(&ground(), &wall(0.02), 0.01, false), None);
-        // Below: it meets the back.
+        assert_eq!(contact(&horizontal_plane(), &wall(0.02), 0.01, false), None);
+        // Below the plane, it is in contact with the back.
         let below = wall(0.0).map(|corner| DVec3::new(corner.x, corner.y, -corner.z));
-        assert_eq!(contact(&ground(), &below, 0.01, false), None);
-        assert!(contact(&ground(), &below, 0.01, true).is_some());
+        assert_eq!(contact(&horizontal_plane(), &below, 0.01, false), None);
+        assert!(contact(&horizontal_plane(), &below, 0.01, true).is_some());
     }
 }

@@ -1,6 +1,7 @@
-//! The form factor between two unoccluded convex polygons by their contours, and what the Monte Carlo ones are checked by:
-//! A_i F_ij = ∬ F(point → polygon j), with Lambert's exact inner formula and Gauss-Legendre points on the outer polygon.
-//! Polygons that share an edge make the inner factor jump at the edge, so the outer points crowd towards every border.
+//! The form factor between two unoccluded triangles, as a reference for tests of the Monte Carlo form factors: A_i F_ij
+//! = ∬ F(point → triangle j), with Lambert's exact inner formula and Gauss-Legendre points on the outer triangle. Where
+//! two triangles share an edge, the inner form factor jumps there, so the outer points are clustered towards every
+//! edge.
 
 use glam::DVec3;
 
@@ -18,13 +19,14 @@ const GAUSS: [(f64, f64); 8] = [
     (0.9801449282487682, 0.050614268145188),
 ];
 
-/// Form factor from one triangle to another, both seen from their fronts, nothing between them.
+/// Form factor from the front of one triangle to the front of another, without occlusion.
 pub(crate) fn triangle_to_triangle(from: &[DVec3; 3], to: &[DVec3; 3]) -> f64 {
     let [a, b, c] = *from;
     let normal = (b - a).cross(c - a);
     let Some(unit) = normal.try_normalize() else { return 0.0 };
-    // Three triangles about the centroid: each has one edge of the border. In each, polar-like coordinates: t runs from
-    // the centroid to the border with points crowding at the border (s³ clustering), u runs along it, at both ends too.
+    // The centroid divides the triangle in three, one for each edge. In each of them, u runs along the edge, with
+    // points clustered at both ends, and t runs from the centroid to the edge, with points clustered at the edge (1 -
+    // y³).
     let center = (a + b + c) / 3.0;
     let mut sum = 0.0;
     for (p, q) in [(a, b), (b, c), (c, a)] {
@@ -33,7 +35,7 @@ pub(crate) fn triangle_to_triangle(from: &[DVec3; 3], to: &[DVec3; 3]) -> f64 {
             let edge = p.lerp(q, u);
             for (y, wy) in composite() {
                 let (t, dt) = (1.0 - y * y * y, 3.0 * y * y);
-                // The area of a triangle in these coordinates: 2 t du dt of it.
+                // The area element in these coordinates is 2 t du dt, as a fraction of a triangle about the centroid.
                 let weight = wx * du * wy * dt * 2.0 * t / 3.0;
                 sum += weight * point_to_triangle(center.lerp(edge, t), unit, to);
             }
@@ -42,12 +44,12 @@ pub(crate) fn triangle_to_triangle(from: &[DVec3; 3], to: &[DVec3; 3]) -> f64 {
     sum
 }
 
-/// The rule on two halves.
+/// The Gauss-Legendre rule applied to both halves of [0, 1].
 fn composite() -> impl Iterator<Item = (f64, f64)> {
     [0.0, 0.5].into_iter().flat_map(|start| GAUSS.iter().map(move |&(x, w)| (start + 0.5 * x, 0.5 * w)))
 }
 
-/// Smoothstep and its derivative.
+/// Smoothstep, which clusters points at both ends of [0, 1], and its derivative.
 fn both_ends(x: f64) -> (f64, f64) {
     (x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x))
 }
@@ -61,7 +63,8 @@ mod tests {
     }
 
     fn factor(from: &[[DVec3; 3]; 2], to: &[[DVec3; 3]; 2]) -> f64 {
-        // Equal halves: the mean over the sources, the sum over the targets.
+        // The halves have equal areas: the form factor is the mean over the source's halves of the sum over the
+        // target's.
         from.iter().map(|f| to.iter().map(|t| triangle_to_triangle(f, t)).sum::<f64>()).sum::<f64>() / 2.0
     }
 
@@ -81,7 +84,7 @@ mod tests {
             (5.0, 0.0124039773132451, 1e-10),
             (100.0, 3.18288667328292e-5, 1e-10),
         ] {
-            // Bounds are the rule's own error, about ten times what it measures.
+            // The bounds are about ten times the measured error of the quadrature rule.
             let found = parallel(distance, 0.0);
             assert!((found - expected).abs() < bound, "{distance}: {found:e} {:e}", found - expected);
         }

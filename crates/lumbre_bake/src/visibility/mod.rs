@@ -1,5 +1,5 @@
-//! What stands between two places, by geometry alone: clipping of polygons, shafts from a lamp to a receiver, and shadows cut out of lamps. Not rays:
-//! those are `scene::occlusion`'s.
+//! Geometric visibility: clipping of polygons, shafts between a source and a receiver, and shadows cut out of lamps and
+//! receivers. Visibility by rays is in `scene::occlusion`.
 
 pub(crate) mod clipping;
 pub(crate) mod contacts;

@@ -1,6 +1,6 @@
-//! Lambert's formula: the form factor from a point to a polygon, clipped to the point's horizon, unoccluded.
-//! F = Σ θ_i n·Γ_i / 2π over the edges, with θ_i the angle an edge subtends and Γ_i the normal of its plane
-//! (Lambert 1760; Baum, Rushmeier, Winget 1989). Exact; f64, since the terms of a distant polygon cancel.
+//! Lambert's formula: the unoccluded form factor from a point to a polygon, clipped to the point's horizon. F = Σ θ_i
+//! n·Γ_i / 2π over the edges, with θ_i the angle that an edge subtends and Γ_i the normal of its plane (Lambert 1760;
+//! Baum, Rushmeier, Winget 1989). It is exact, and computed in f64 since the terms of a distant polygon cancel.
 
 use std::f64::consts::TAU;
 
@@ -8,11 +8,10 @@ use glam::DVec3;
 
 use super::clipping::clip;
 
-/// Form factor from a point with unit `normal` to a triangle seen from its front (the counter-clockwise side).
-/// 0 from behind.
+/// Form factor from a point with unit `normal` to the front (counter-clockwise side) of a triangle; 0 from behind.
 pub(crate) fn point_to_triangle(point: DVec3, normal: DVec3, triangle: &[DVec3; 3]) -> f64 {
     let relative = triangle.map(|corner| corner - point);
-    // Behind the triangle, or in its plane.
+    // The point is behind the triangle or in its plane.
     let facing = (relative[1] - relative[0]).cross(relative[2] - relative[0]).dot(relative[0]);
     if facing >= 0.0 {
         return 0.0;
@@ -31,7 +30,8 @@ pub(crate) fn point_to_triangle(point: DVec3, normal: DVec3, triangle: &[DVec3; 
     lambert(normal, &above[..count]).clamp(0.0, 1.0)
 }
 
-/// The sum over the edges of a polygon, seen from its front, above the horizon and relative to the point.
+/// Lambert's sum over the edges of a polygon that is seen from its front. The corners are relative to the point and
+/// above its horizon.
 pub(crate) fn lambert(normal: DVec3, corners: &[DVec3]) -> f64 {
     let count = corners.len();
     let mut sum = 0.0;
@@ -43,7 +43,8 @@ pub(crate) fn lambert(normal: DVec3, corners: &[DVec3]) -> f64 {
             sum += sine.atan2(a.dot(b)) * normal.dot(cross) / sine;
         }
     }
-    // VisibilitySummary from the front the corners run counter-clockwise about the direction to the eye, so clockwise about ours.
+    // Seen from the front, the corners run counter-clockwise about the direction to the viewer, hence clockwise about
+    // ours.
     -sum / TAU
 }
 

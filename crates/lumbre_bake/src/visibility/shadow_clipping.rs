@@ -1,45 +1,45 @@
-//! The part of a small flat piece of surface that a point, or a direction, sends light to past some triangles: exactly, by cutting their
-//! shadows out of it. Not which triangles: that is `shaft`; not the light: that is `punctual`.
+//! The lit part of a small flat receiver under a point or directional light, computed exactly by cutting the shadows of
+//! occluders out of it. `shaft` finds the occluders, and `sources::punctual` computes the light.
 
 use glam::DVec3;
 
 use super::cut_out::{GAP, Piece, Pieces, Shadow};
 
-/// Where light comes from, canonical units.
+/// Where the light comes from, in canonical units.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Origin {
     Point(DVec3),
-    /// Towards it, of unit length.
+    /// Unit vector towards the light.
     Direction(DVec3),
 }
 
-/// What a receiver shows of a plane.
+/// The shape of a flat receiver.
 #[derive(Clone, Debug)]
 pub(crate) enum ReceiverShape {
-    /// Corners, one after the other.
+    /// The corners in order.
     Parallelogram([DVec3; 4]),
-    /// Each as much as any other.
+    /// Points of equal weight.
     Points(Vec<DVec3>),
 }
 
-/// What is known of a light without size on its way to a receiver.
+/// What is known about the visibility of a light from a receiver.
 #[derive(Clone, Debug)]
 pub(crate) enum LightVisibility {
-    /// Nothing stands between; also to a light with a size.
+    /// Nothing occludes the light.
     Clear,
-    /// It does not shine here.
+    /// The light emits nothing towards the receiver.
     Dark,
-    /// Nothing of it arrives.
+    /// The light is fully occluded.
     Hidden,
-    /// These shadows may fall on it.
+    /// These shadows of the light, which has no size, may fall on the receiver.
     Shadows(Origin, Vec<Shadow>),
 }
 
-/// Points along a side of what is cut into too many pieces.
+/// Points along a side of the grid that replaces exact clipping if there are too many pieces.
 const FINE: u32 = 8;
 
 impl Origin {
-    /// What a triangle hides from here; none if it is seen edge on.
+    /// The shadow of a triangle; `None` if the triangle is edge-on to the light.
     pub fn shadow(self, corners: [DVec3; 3]) -> Option<Shadow> {
         match self {
             Self::Point(point) => Shadow::new(corners.map(|corner| corner - point)),
@@ -47,7 +47,7 @@ impl Origin {
         }
     }
 
-    /// What shadows' coordinates begin at.
+    /// The origin of the shadows' coordinates.
     fn zero(self) -> DVec3 {
         match self {
             Self::Point(point) => point,
@@ -55,13 +55,13 @@ impl Origin {
         }
     }
 
-    /// Calls `visit` for the pieces of `shown` that are lit: with a point that stands for each, and the piece's share of the whole. Returns
-    /// whether the shares are exact, and not those of points.
+    /// Calls `visit` for each lit piece of the receiver, with a point that represents it and its fraction of the whole.
+    /// Returns whether the fractions are exact, and not estimated by points.
     pub fn lit(
         self,
         shape: &ReceiverShape,
         shadows: &[Shadow],
-        room: &mut Pieces,
+        pieces: &mut Pieces,
         mut visit: impl FnMut(DVec3, f64),
     ) -> bool {
         let zero = self.zero();
@@ -74,7 +74,7 @@ impl Origin {
             }
             ReceiverShape::Parallelogram(corners) => {
                 let corners = corners.map(|corner| corner - zero);
-                if room.begin(&corners).is_none() || !left(room, shadows) {
+                if pieces.begin(&corners).is_none() || !cut_all(pieces, shadows) {
                     let share = 1.0 / f64::from(FINE * FINE);
                     let at = |place: u32| (f64::from(place) + 0.5) / f64::from(FINE);
                     let [a, b, _, d] = corners;
@@ -86,38 +86,41 @@ impl Origin {
                     }
                     return false;
                 }
-                let (whole, _) = middle(&corners);
-                if is_left(whole, room) {
-                    let parts = room.list().iter().map(Piece::corners).map(middle);
-                    parts.for_each(|(area, middle)| visit(zero + middle, area / whole));
+                let (whole, _) = area_and_centroid(&corners);
+                if is_partly_lit(whole, pieces) {
+                    let lit = pieces.list().iter().map(Piece::corners).map(area_and_centroid);
+                    lit.for_each(|(area, centroid)| visit(zero + centroid, area / whole));
                 }
                 true
             }
         }
     }
 
-    /// Whether nothing of a parallelogram is lit.
-    pub fn hides_all(self, corners: [DVec3; 4], shadows: &[Shadow], room: &mut Pieces) -> bool {
+    /// Whether the shadows are known to cover a whole parallelogram.
+    pub fn hides_all(self, corners: [DVec3; 4], shadows: &[Shadow], pieces: &mut Pieces) -> bool {
         let corners = corners.map(|corner| corner - self.zero());
-        let whole = middle(&corners).0;
-        // Of no area, nothing is known.
-        whole > 0.0 && room.begin(&corners).is_some() && left(room, shadows) && !is_left(whole, room)
+        let whole = area_and_centroid(&corners).0;
+        // Nothing is known about a parallelogram without area.
+        whole > 0.0
+            && pieces.begin(&corners).is_some()
+            && cut_all(pieces, shadows)
+            && !is_partly_lit(whole, pieces)
     }
 }
 
-/// Whether there is more left of a whole area than the gaps that rounding leaves between shadows that meet.
-fn is_left(whole: f64, room: &Pieces) -> bool {
-    let lit: f64 = room.list().iter().map(|piece| middle(piece.corners()).0).sum();
+/// Whether more of the area `whole` remains than the gaps that rounding leaves between adjacent shadows.
+fn is_partly_lit(whole: f64, pieces: &Pieces) -> bool {
+    let lit: f64 = pieces.list().iter().map(|piece| area_and_centroid(piece.corners()).0).sum();
     whole > 0.0 && lit > GAP * whole
 }
 
-/// Cuts shadows out of what is in `room`; `false` if there are too many pieces.
-fn left(room: &mut Pieces, shadows: &[Shadow]) -> bool {
+/// Cuts all shadows out of `pieces`; `false` if there are too many pieces.
+fn cut_all(pieces: &mut Pieces, shadows: &[Shadow]) -> bool {
     for shadow in shadows {
-        if room.cut(shadow).is_none() {
+        if pieces.cut(shadow).is_none() {
             return false;
         }
-        if room.list().is_empty() {
+        if pieces.list().is_empty() {
             break;
         }
     }
@@ -125,13 +128,13 @@ fn left(room: &mut Pieces, shadows: &[Shadow]) -> bool {
 }
 
 /// Area and centroid of a flat convex polygon.
-fn middle(corners: &[DVec3]) -> (f64, DVec3) {
+fn area_and_centroid(corners: &[DVec3]) -> (f64, DVec3) {
     let Some(&first) = corners.first() else { return (0.0, DVec3::ZERO) };
     let (mut area, mut moment) = (0.0, DVec3::ZERO);
     for pair in corners[1..].windows(2) {
-        let own = 0.5 * (pair[0] - first).cross(pair[1] - first).length();
-        area += own;
-        moment += (pair[0] + pair[1] - 2.0 * first) * (own / 3.0);
+        let triangle_area = 0.5 * (pair[0] - first).cross(pair[1] - first).length();
+        area += triangle_area;
+        moment += (pair[0] + pair[1] - 2.0 * first) * (triangle_area / 3.0);
     }
     (area, if area > 0.0 { first + moment / area } else { first })
 }

@@ -1,4 +1,4 @@
-//! The lit part against segments to the light, and in closed form.
+//! Tests of the lit part of a receiver, against segments to the light and against closed forms.
 
 use super::*;
 use crate::sampling::{Sequence, Stream};
@@ -9,13 +9,13 @@ fn floor() -> [DVec3; 4] {
     FLOOR.map(DVec3::from)
 }
 
-/// Share that is lit, and the mean place of what is, times that share.
+/// The lit fraction, and the mean position of the lit part times that fraction.
 fn lit(origin: Origin, shape: &ReceiverShape, blockers: &[[DVec3; 3]]) -> (f64, DVec3) {
     let shadows: Vec<Shadow> = blockers.iter().filter_map(|&corners| origin.shadow(corners)).collect();
     let (mut share, mut moment) = (0.0, DVec3::ZERO);
-    origin.lit(shape, &shadows, &mut Pieces::new(), |place, own| {
-        share += own;
-        moment += place * own;
+    origin.lit(shape, &shadows, &mut Pieces::new(), |place, piece_share| {
+        share += piece_share;
+        moment += place * piece_share;
     });
     (share, moment)
 }
@@ -27,8 +27,9 @@ fn square(half: f64, height: f64) -> [[DVec3; 3]; 2] {
 }
 
 #[test]
-fn a_square_sheet_throws_a_square_shadow() {
-    // Half as high as the light, twice as large; under a light in the sky as large as it is. The floor's area is 1.
+fn a_square_sheet_casts_a_square_shadow() {
+    // The sheet is half as high as the point light, so its shadow is twice as large; under a directional light the
+    // shadow is as large as the sheet. The floor's area is 1.
     for (origin, side) in [
         (Origin::Point(DVec3::Y), 0.6),
         (Origin::Direction(DVec3::Y), 0.3),
@@ -36,7 +37,7 @@ fn a_square_sheet_throws_a_square_shadow() {
     ] {
         let (share, moment) = lit(origin, &ReceiverShape::Parallelogram(floor()), &square(0.15, 0.5));
         assert!((share - (1.0 - side * side)).abs() < 1e-12, "{origin:?} {share}");
-        // The floor's middle is 0.05 beside the shadow's.
+        // The floor's centre is 0.05 from the shadow's.
         assert!((moment - DVec3::X * 0.05).length() < 1e-12, "{origin:?} {moment}");
     }
     let all = Origin::Point(DVec3::Y);
@@ -47,9 +48,10 @@ fn a_square_sheet_throws_a_square_shadow() {
     assert_eq!(lit(all, &ReceiverShape::Parallelogram(floor()), &square(0.4, 0.5)).0, 0.0);
 }
 
-/// Random triangles: what is lit is what a fine grid of segments to the light finds lit, whether cut or by points.
+/// With random triangles, the lit fraction equals that of a fine grid of segments to the light, both by cutting and by
+/// points.
 #[test]
-fn a_crowd_of_triangles_leaves_what_segments_find_lit() {
+fn random_triangles_leave_the_part_lit_that_segments_find_lit() {
     let sequence = Sequence::new(3, Stream::Test(79), 0);
     let mut partly = 0;
     for crowd in 0..40 {
@@ -85,8 +87,9 @@ fn a_crowd_of_triangles_leaves_what_segments_find_lit() {
             .collect();
         let expected = points.iter().filter(|point| is_lit(**point)).count() as f64 / points.len() as f64;
         let (whole, _) = lit(origin, &ReceiverShape::Parallelogram(floor()), &blockers);
-        // An edge right across meets 128 cells of 128², each wrong by a half at most and by chance: √128 / 128² / √12, here four edges and
-        // 5 sigma, 2e-3. Sixty triangles make more pieces than are kept: a grid of 8 by 8 points, so 1/64 for each of some edges.
+        // An edge across the grid passes through 128 of its 128² cells, each with a random error of at most a half:
+        // standard deviation √128 / 128² / √12, which for four edges and 5 sigma is 2e-3. Sixty triangles exceed the
+        // number of pieces, so a grid of 8 by 8 points is used, with an error of 1/64 for each of a few edges.
         let bound = if count == 4 { 2e-3 } else { 0.05 };
         assert!((whole - expected).abs() < bound, "{crowd}: {whole} {expected}");
         let (by_points, _) = lit(origin, &ReceiverShape::Points(points), &blockers);
@@ -97,7 +100,7 @@ fn a_crowd_of_triangles_leaves_what_segments_find_lit() {
 }
 
 #[test]
-fn scales_do_not_matter() {
+fn scaling_by_a_power_of_two_changes_no_bit() {
     let blockers = square(0.2, 0.4);
     let origin = DVec3::new(0.3, 1.0, 0.1);
     let (one, _) = lit(Origin::Point(origin), &ReceiverShape::Parallelogram(floor()), &blockers);
@@ -108,7 +111,7 @@ fn scales_do_not_matter() {
 }
 
 #[test]
-fn points_on_an_edge_that_triangles_share_are_hidden() {
+fn points_in_the_shadow_of_a_shared_edge_are_hidden() {
     let along: Vec<DVec3> =
         (0..101).map(|i| DVec3::new(0.002, 0.0, 0.002) * f64::from(i) - DVec3::new(0.1, 0.0, 0.1)).collect();
     for origin in [Origin::Point(DVec3::Y), Origin::Direction(DVec3::Y)] {

@@ -1,27 +1,30 @@
-//! What may stand between a flat piece of surface and what shines on it: the triangles that reach into the convex hull of both (Haines and
-//! Wallace, "Shaft Culling for Efficient Ray-Traced Radiosity", 1991). Where none does, no shadow ray is needed. What is named may still
-//! stand beside; what is not named does not matter. Not how much they hide: that is `visible_part` and `shadow_clipping`.
+//! Shaft culling: finds the triangles that may stand between a flat receiver and a source, those that reach into the
+//! convex hull of both (Haines and Wallace, "Shaft Culling for Efficient Ray-Traced Radiosity", 1991). The test is
+//! conservative: a triangle that is found may hide nothing, but one that is not found certainly hides nothing, and
+//! where none is found no shadow ray is needed. `visible_part` and `shadow_clipping` compute how much the triangles
+//! hide.
 
 use glam::{DVec3, Vec3};
 
 use crate::sampling::frame;
 use crate::scene::BakeScene;
 
-/// A parallelogram that holds a flat piece of surface.
+/// A parallelogram that contains a flat receiver.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Area {
     pub corners: [DVec3; 4],
-    /// Unit, of the side that receives.
+    /// Unit normal of the receiving side.
     pub normal: DVec3,
 }
 
 /// Corners of a triangle.
 pub(crate) type Corners = [DVec3; 3];
 
-/// Distance that counts as none, relative to coordinates: what rays are moved off surfaces by.
+/// Distance relative to the coordinates up to which things count as touching: the offset of ray origins from surfaces.
 const CONTACT: f64 = 16.0 / (1 << 24) as f64;
 
-/// How far apart what touches may be, along a unit normal, by the rounding of coordinates of that size.
+/// Distance along a unit normal up to which things with coordinates of size `extent` count as touching, despite
+/// rounding.
 pub(crate) fn contact(normal: DVec3, extent: f64) -> f64 {
     CONTACT * extent * normal.abs().element_sum()
 }
@@ -33,8 +36,8 @@ struct Plane {
     height: f64,
 }
 
-/// Whether no triangle of a scene reaches into the space before an area, as high as the area is wide, or into as much beside it: what is
-/// inside something there, or outside, is so all over.
+/// Whether no triangle reaches into the box above an area that is as high as the area is wide and extends beyond it by
+/// as much on each side. If so, all points of the area are inside geometry or all are outside.
 pub(crate) fn is_free_before(area: &Area, scene: &BakeScene) -> bool {
     let [a, b, c, d] = area.corners;
     let (row, across) = (b - a, d - a);
@@ -50,115 +53,124 @@ pub(crate) fn is_free_before(area: &Area, scene: &BakeScene) -> bool {
         (low, high) = (low.min(*point), high.max(*point));
     }
     let sides = [area.normal, row.normalize_or_zero(), across.normalize_or_zero()];
-    let mut looked_at = 0;
+    let mut tested = 0;
     scene.boxes.near_while(low.as_vec3(), high.as_vec3(), |index| {
-        looked_at += 1;
+        tested += 1;
         let triangle = &scene.triangles[index as usize];
         let corners = triangle.corners.map(|corner| corner.as_dvec3());
-        let own = triangle.normal.as_dvec3();
-        let beside = sides.into_iter().chain([own]).any(|side| {
+        let triangle_normal = triangle.normal.as_dvec3();
+        // Separating axis test, with the box's axes and the triangle's normal.
+        let is_beside = sides.into_iter().chain([triangle_normal]).any(|side| {
             let slack = contact(side, extent.max(f64::from(triangle.extent)));
             let range = |places: &[DVec3]| {
                 places
                     .iter()
                     .map(|place| place.dot(side))
-                    .fold((f64::MAX, f64::MIN), |(low, high), own| (low.min(own), high.max(own)))
+                    .fold((f64::MAX, f64::MIN), |(low, high), along| (low.min(along), high.max(along)))
             };
-            let (one, other) = (range(&points), range(&corners));
-            other.0 >= one.1 - slack || other.1 <= one.0 + slack
+            let (of_box, of_triangle) = (range(&points), range(&corners));
+            of_triangle.0 >= of_box.1 - slack || of_triangle.1 <= of_box.0 + slack
         });
-        beside && looked_at <= MAX_LOOKED_AT
+        is_beside && tested <= MAX_TESTED
     })
 }
 
-/// The convex hull of an area and what shines on it.
+/// The convex hull of a receiver's area and a source.
 pub(crate) struct Shaft {
+    /// The corners of the area, then those of the source.
     points: Vec<DVec3>,
     planes: Vec<Plane>,
-    /// Largest absolute coordinate of what has a place.
+    /// Largest absolute coordinate, not counting the far ends of directions.
     extent: f64,
-    /// Planes of which what touches them is outside, too: the first so many. Towards a light the others run together to a point, and what
-    /// meets along an edge there would leave a gap.
+    /// Number of leading planes for which a triangle that only touches the plane is outside. Towards a punctual light,
+    /// the other planes converge to a point, where this tolerance would leave a gap between triangles that meet along
+    /// an edge.
     touched: usize,
 }
 
-/// Coordinates of a scene are below this; and longer than any way through it.
+/// Upper bound of the coordinates of a scene.
 const LARGEST: f64 = 2.25;
+/// Longer than any path through a scene.
 const FAR: f64 = 16.0;
-/// The widest half angle of a light in the sky that shafts lead to, radians.
+/// Largest half angle of a directional light that shafts support, radians.
 pub(crate) const WIDEST: f64 = 0.5;
-/// What is around a round thing is so much larger, for what rounds.
-const ROOM: f64 = 1.001;
+/// Factor by which the bounds of a sphere or cone are enlarged, against rounding.
+const MARGIN: f64 = 1.001;
 
-/// Edges of the cube whose corner i has its signs in the bits of i.
+/// Edges of a cube whose corner i has the signs of its coordinates in the bits of i.
 const CUBE_EDGES: [[usize; 2]; 12] =
     [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
 impl Shaft {
-    /// To a triangle that shines on the side of its `normal`; `None` where it is wholly behind the area, or the area behind it: no light passes.
+    /// The shaft to a triangle that emits on the side of its `normal`. `None` if no light can pass, because the
+    /// triangle is entirely behind the area or the area behind the triangle.
     pub fn new(area: &Area, [p, q, r]: Corners, normal: Vec3) -> Option<Self> {
         let mut shaft = Self::before(area, &[p, q, r]);
-        let shines = normal.as_dvec3();
-        let slack = shaft.slack(shines, shaft.extent);
-        let lit = area.corners.iter().any(|&point| (point - p).dot(shines) > slack);
-        if !lit || !shaft.is_reached(area) {
+        let normal = normal.as_dvec3();
+        let slack = shaft.slack(normal, shaft.extent);
+        let is_lit = area.corners.iter().any(|&point| (point - p).dot(normal) > slack);
+        if !is_lit || !shaft.is_reached(area) {
             return None;
         }
-        // Light leaves the one and arrives at the other by their fronts alone.
-        let lowest = [p, q, r].iter().map(|corner| -corner.dot(shines)).fold(f64::MIN, f64::max);
-        shaft.planes.push(Plane { normal: -shines, height: lowest });
+        // Light travels only between the fronts of the two, so what is behind the triangle's plane is outside.
+        let height = [p, q, r].iter().map(|corner| -corner.dot(normal)).fold(f64::MIN, f64::max);
+        shaft.planes.push(Plane { normal: -normal, height });
         shaft.close(&[[0, 1], [1, 2], [2, 0]]);
         shaft.touched = shaft.planes.len();
         Some(shaft)
     }
 
-    /// To a point; `None` if that is behind the area.
+    /// The shaft to a point; `None` if that is behind the area.
     pub fn to_point(area: &Area, point: DVec3) -> Option<Self> {
         Self::before(area, &[point]).closed_if_reached(area, &[])
     }
 
-    /// To all of a ball, and to a little beside it; `None` if it is wholly behind the area.
+    /// The shaft to a cube that contains a sphere; `None` if that is entirely behind the area.
     pub fn to_ball(area: &Area, center: DVec3, radius: f64) -> Option<Self> {
-        let sign = |corner: usize, axis: usize| ROOM * if corner >> axis & 1 == 1 { radius } else { -radius };
+        let sign =
+            |corner: usize, axis: usize| MARGIN * if corner >> axis & 1 == 1 { radius } else { -radius };
         let corner = |corner: usize| center + DVec3::from([0, 1, 2].map(|axis| sign(corner, axis)));
         let corners: [DVec3; 8] = std::array::from_fn(corner);
         Self::before(area, &corners).closed_if_reached(area, &CUBE_EDGES)
     }
 
-    /// As far as a scene goes in a direction; `None` if that leads behind the area.
+    /// The shaft in a direction, as far as any scene extends; `None` if the direction leads behind the area.
     pub fn towards(area: &Area, direction: DVec3) -> Option<Self> {
         let ends = area.corners.map(|corner| corner + direction * FAR);
         Self::before(area, &ends).closed_if_reached(area, &[])
     }
 
-    /// In all directions of a cone, by half its angle, at most [`WIDEST`], and a little beside it; `None` if all of them lead behind the area.
+    /// The shaft in all directions of a square pyramid that contains a cone, given by its half angle of at most
+    /// [`WIDEST`]; `None` if all of them lead behind the area.
     pub fn in_cone(area: &Area, direction: DVec3, half_angle: f64) -> Option<Self> {
-        let [x, y] = frame(direction.as_vec3()).map(|side| side.as_dvec3() * half_angle.tan() * ROOM);
-        let ways = [x + y, y - x, -x - y, x - y].map(|side| (direction + side) * FAR);
-        let ends: Vec<DVec3> = area.corners.iter().flat_map(|&corner| ways.map(|way| corner + way)).collect();
+        let [x, y] = frame(direction.as_vec3()).map(|side| side.as_dvec3() * half_angle.tan() * MARGIN);
+        let offsets = [x + y, y - x, -x - y, x - y].map(|side| (direction + side) * FAR);
+        let ends: Vec<DVec3> =
+            area.corners.iter().flat_map(|&corner| offsets.map(|offset| corner + offset)).collect();
         let edges: Vec<[usize; 2]> =
             (0..16).map(|end| [end, if end % 4 == 3 { end - 3 } else { end + 1 }]).collect();
         Self::before(area, &ends).closed_if_reached(area, &edges)
     }
 
-    /// Open but for the area's own side.
+    /// A shaft to `ends` that still lacks all planes except that of the area.
     fn before(area: &Area, ends: &[DVec3]) -> Self {
         let points: Vec<DVec3> = area.corners.iter().chain(ends).copied().collect();
         let extent = |points: &[DVec3]| points.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        // What ends far away has no place there that could be rounded.
+        // The far ends of directions are not positions of the scene, so they add no rounding error.
         let extent = extent(&points).min(extent(&area.corners).max(LARGEST));
-        let lowest = area.corners.iter().map(|corner| -corner.dot(area.normal)).fold(f64::MIN, f64::max);
+        let height = area.corners.iter().map(|corner| -corner.dot(area.normal)).fold(f64::MIN, f64::max);
         let mut planes = Vec::with_capacity(1 + 4 * ends.len());
-        planes.push(Plane { normal: -area.normal, height: lowest });
+        planes.push(Plane { normal: -area.normal, height });
         Self { points, planes, extent, touched: 1 }
     }
 
-    /// Whether something of the ends is before the area.
+    /// Whether any of the ends is in front of the area.
     fn is_reached(&self, area: &Area) -> bool {
         let slack = self.slack(area.normal, self.extent);
         self.points[4..].iter().any(|&point| (point - area.corners[0]).dot(area.normal) > slack)
     }
 
+    /// The shaft with all its planes; `None` if no end is in front of the area. `edges` are pairs of ends.
     fn closed_if_reached(mut self, area: &Area, edges: &[[usize; 2]]) -> Option<Self> {
         if !self.is_reached(area) {
             return None;
@@ -167,11 +179,12 @@ impl Shaft {
         Some(self)
     }
 
-    /// Planes through every edge of the area and every end, and through every edge between ends and every corner of the area.
+    /// Adds the planes through an edge of the area and an end, and through an edge between ends and a corner of the
+    /// area, that bound the hull.
     fn close(&mut self, edges: &[[usize; 2]]) {
-        let own = [[0, 1], [1, 2], [2, 3], [3, 0]].map(|edge| (edge, 4..self.points.len()));
-        let far = edges.iter().map(|edge| (edge.map(|end| end + 4), 0..4));
-        for ([from, to], others) in own.into_iter().chain(far) {
+        let area_edges = [[0, 1], [1, 2], [2, 3], [3, 0]].map(|edge| (edge, 4..self.points.len()));
+        let end_edges = edges.iter().map(|edge| (edge.map(|end| end + 4), 0..4));
+        for ([from, to], others) in area_edges.into_iter().chain(end_edges) {
             let (from, along) = (self.points[from], self.points[to] - self.points[from]);
             for other in others {
                 let Some(normal) = along.cross(self.points[other] - from).try_normalize() else { continue };
@@ -180,13 +193,13 @@ impl Shaft {
         }
     }
 
-    /// A plane through three of the points, if the others lie on one side of it.
+    /// Adds a plane through three of the points if all others lie on one side of it.
     fn push_facet(&mut self, normal: DVec3, height: f64) {
         let slack = self.slack(normal, self.extent);
         let (mut above, mut below) = (height, height);
         for point in &self.points {
-            let own = normal.dot(*point);
-            (above, below) = (above.max(own), below.min(own));
+            let point_height = normal.dot(*point);
+            (above, below) = (above.max(point_height), below.min(point_height));
         }
         if above <= height + slack {
             self.planes.push(Plane { normal, height: above });
@@ -195,11 +208,12 @@ impl Shaft {
         }
     }
 
+    /// Tolerance for touching along a normal, for coordinates up to `extent` or those of the shaft.
     fn slack(&self, normal: DVec3, extent: f64) -> f64 {
         contact(normal, self.extent.max(extent))
     }
 
-    /// Whether a triangle, whose largest absolute coordinate is `extent`, may reach into it.
+    /// Whether a triangle, whose largest absolute coordinate is `extent`, may reach into the shaft.
     pub fn may_meet(&self, corners: &Corners, extent: f64) -> bool {
         for (place, plane) in self.planes.iter().enumerate() {
             let slack = if place < self.touched { self.slack(plane.normal, extent) } else { 0.0 };
@@ -213,36 +227,37 @@ impl Shaft {
         let (slack, height) = (self.slack(normal, extent), normal.dot(a));
         let (mut above, mut below) = (false, false);
         for point in &self.points {
-            let own = normal.dot(*point) - height;
-            above |= own > slack;
-            below |= own < -slack;
+            let point_height = normal.dot(*point) - height;
+            above |= point_height > slack;
+            below |= point_height < -slack;
         }
         above && below
     }
 
-    /// The triangles of a scene that may reach into it, if they are few and stop all light.
+    /// The triangles of a scene that may reach into the shaft; `None` if they are more than `most`, if too many must be
+    /// tested, or if one of them lets light through.
     pub fn triangles(&self, scene: &BakeScene, most: usize) -> Option<Vec<u32>> {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for point in &self.points {
             (low, high) = (low.min(*point), high.max(*point));
         }
-        let (mut found, mut looked_at) = (Vec::new(), 0);
-        let all = scene.boxes.near_while(low.as_vec3(), high.as_vec3(), |index| {
-            looked_at += 1;
+        let (mut found, mut tested) = (Vec::new(), 0);
+        let is_complete = scene.boxes.near_while(low.as_vec3(), high.as_vec3(), |index| {
+            tested += 1;
             let triangle = &scene.triangles[index as usize];
             if self.may_meet(&triangle.corners.map(|corner| corner.as_dvec3()), f64::from(triangle.extent)) {
                 found.push(index);
             }
-            looked_at <= MAX_LOOKED_AT && found.len() <= most
+            tested <= MAX_TESTED && found.len() <= most
         });
-        let solid =
+        let is_opaque =
             |&index: &u32| !scene.surfaces[scene.triangles[index as usize].surface as usize].is_masked();
-        (all && found.iter().all(solid)).then_some(found)
+        (is_complete && found.iter().all(is_opaque)).then_some(found)
     }
 }
 
-/// Most triangles that are looked at for one shaft, and that may stand in it: beyond, rays are quicker.
-const MAX_LOOKED_AT: usize = 512;
+/// Most triangles that are tested for one shaft; with more, shadow rays are faster.
+const MAX_TESTED: usize = 512;
 
 #[cfg(test)]
 #[path = "shaft_tests.rs"]

@@ -1,4 +1,4 @@
-//! What a shaft leaves out stands in no segment's way.
+//! Tests that a triangle outside of a shaft blocks no segment inside it.
 
 use glam::{DVec3, Vec3};
 
@@ -7,7 +7,7 @@ use crate::sampling::{Sequence, Stream};
 use crate::scene::material::Side;
 use crate::sources::emitters::Emitter;
 
-/// A square of the floor, one wide, about the origin.
+/// A unit square of the floor, centred at the origin.
 fn floor() -> Area {
     let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]].map(|[x, z]| DVec3::new(x, 0.0, z));
     Area { corners, normal: DVec3::Y }
@@ -46,12 +46,13 @@ fn meets(shaft: &Shaft, corners: [[f64; 3]; 3]) -> bool {
 #[test]
 fn walls_floors_and_ceilings_are_outside() {
     let shaft = to_emitter(&above()).unwrap();
-    // The floor itself, the ceiling behind the lamp, a wall that touches the edge of both, and something beside.
+    // The floor itself, the ceiling behind the lamp, a wall that touches the edges of both, and a triangle beside the
+    // shaft.
     assert!(!meets(&shaft, [[-9.0, 0.0, -9.0], [9.0, 0.0, -9.0], [0.0, 0.0, 9.0]]));
     assert!(!meets(&shaft, [[-9.0, 2.0, -9.0], [9.0, 2.0, -9.0], [0.0, 2.0, 9.0]]));
     assert!(!meets(&shaft, [[0.5, -9.0, -9.0], [0.5, 9.0, -9.0], [0.5, 0.0, 9.0]]));
     assert!(!meets(&shaft, [[0.6, 1.0, 0.0], [2.0, 1.0, 1.0], [2.0, 1.0, 0.0]]));
-    // What is in the middle, and a needle's point.
+    // A triangle in the middle, and one whose sharp corner reaches in.
     assert!(meets(&shaft, [[-0.1, 1.0, -0.1], [0.1, 1.0, -0.1], [0.0, 1.0, 0.1]]));
     assert!(meets(&shaft, [[0.3, 0.5, 0.0], [2.0, 1.0, 1.0], [2.0, 1.0, 0.0]]));
 }
@@ -66,8 +67,9 @@ fn no_light_passes_between_backs() {
     assert!(to_emitter(&in_plane).is_none());
 }
 
-/// Random triangles: whatever stands between a point of the area and what a pair of numbers names at the other end is named.
-fn names_what_segments_meet(shaft: &Shaft, purpose: u32, end: impl Fn(DVec3, f64, f64) -> DVec3) {
+/// Checks with random triangles that all that block a segment inside the shaft are found. `end` maps a segment's start
+/// and two random numbers to the segment's end.
+fn finds_all_that_block_segments(shaft: &Shaft, purpose: u32, end: impl Fn(DVec3, f64, f64) -> DVec3) {
     let sequence = Sequence::new(5, Stream::Test(purpose), 0);
     let (mut met, mut out) = (0, 0);
     for index in 0..2000 {
@@ -95,41 +97,41 @@ fn names_what_segments_meet(shaft: &Shaft, purpose: u32, end: impl Fn(DVec3, f64
 }
 
 #[test]
-fn whatever_a_segment_to_a_lamp_meets_is_inside() {
+fn what_blocks_a_segment_to_a_lamp_is_inside() {
     let lamp = above();
     let [p, q, r] = lamp.corners_f64;
-    names_what_segments_meet(&to_emitter(&lamp).unwrap(), 99, |_, u, v| {
+    finds_all_that_block_segments(&to_emitter(&lamp).unwrap(), 99, |_, u, v| {
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         p + (q - p) * u + (r - p) * v
     });
 }
 
 #[test]
-fn whatever_a_segment_to_a_light_meets_is_inside() {
+fn what_blocks_a_segment_to_a_light_is_inside() {
     let place = DVec3::new(0.4, 1.7, -0.3);
-    names_what_segments_meet(&Shaft::to_point(&floor(), place).unwrap(), 100, |_, _, _| place);
+    finds_all_that_block_segments(&Shaft::to_point(&floor(), place).unwrap(), 100, |_, _, _| place);
     let direction = |u: f64, v: f64| {
         let (z, angle) = (2.0 * u - 1.0, std::f64::consts::TAU * v);
         let across = (1.0 - z * z).sqrt();
         DVec3::new(across * angle.cos(), z, across * angle.sin())
     };
     let ball = Shaft::to_ball(&floor(), place, 0.3).unwrap();
-    names_what_segments_meet(&ball, 101, |_, u, v| place + direction(u, v) * 0.3);
+    finds_all_that_block_segments(&ball, 101, |_, u, v| place + direction(u, v) * 0.3);
     let towards = place.normalize();
     let parallel = Shaft::towards(&floor(), towards).unwrap();
-    names_what_segments_meet(&parallel, 102, |from, _, _| from + towards * 5.0);
+    finds_all_that_block_segments(&parallel, 102, |from, _, _| from + towards * 5.0);
     let cone = Shaft::in_cone(&floor(), towards, 0.2).unwrap();
     let side = towards.any_orthonormal_vector();
-    names_what_segments_meet(&cone, 103, |from, u, v| {
+    finds_all_that_block_segments(&cone, 103, |from, u, v| {
         let around = glam::DQuat::from_axis_angle(towards, std::f64::consts::TAU * v) * side;
         from + (towards + around * (0.2f64.tan() * u.sqrt())) * 5.0
     });
 }
 
 #[test]
-fn what_is_beside_a_lights_way_is_outside() {
+fn triangles_beside_the_path_to_a_light_are_outside() {
     let above = [[-0.1, 1.0, -0.1], [0.1, 1.0, -0.1], [0.0, 1.0, 0.1]];
-    // The narrow end of a pyramid leaves this one beside; a light in the sky does not.
+    // This triangle is outside of the narrow end of a pyramid, but inside the prism of a directional light.
     let beside = [[0.4, 1.9, -0.1], [0.4, 1.95, 0.1], [0.45, 1.9, 0.0]];
     let wall = [[0.5, -9.0, -9.0], [0.5, 9.0, -9.0], [0.5, 0.0, 9.0]];
     let beyond = [[-0.1, 2.1, -0.1], [0.1, 2.1, -0.1], [0.0, 2.1, 0.1]];

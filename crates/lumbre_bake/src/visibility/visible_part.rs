@@ -1,6 +1,6 @@
-//! The part of an emitter that a point sees past some triangles, exactly: what each of them hides is cut out of the emitter, and Lambert's
-//! formula taken over the pieces that are left (Nishita and Nakamae, "Half-Tone Representation of 3-D Objects Illuminated by Area Sources",
-//! 1983). Not which triangles: that is `shaft`.
+//! The exact form factor of the part of an emitter that is visible from a point past some triangles: their shadows are
+//! cut out of the emitter, and Lambert's formula is summed over the remaining pieces (Nishita and Nakamae, "Half-Tone
+//! Representation of 3-D Objects Illuminated by Area Sources", 1983). `shaft` finds the triangles.
 
 use glam::DVec3;
 
@@ -8,41 +8,41 @@ use super::cut_out::{GAP, Pieces, Shadow};
 use super::polygon::{lambert, point_to_triangle};
 use super::shaft::Corners;
 
-/// What a point sees of an emitter.
+/// The part of an emitter that is visible from a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Visible {
-    /// Form factor of what is seen.
+    /// Form factor of the visible part.
     pub factor: f64,
-    /// Some of it is hidden.
+    /// Whether some of the emitter is hidden.
     pub hidden: bool,
 }
 
-/// Form factor from a point with unit `normal` to what it sees of a triangle, that shines to its counter-clockwise side, past `blockers`.
-/// `None` if they cut it into too many pieces.
+/// The part of an emitter, a triangle that emits on its counter-clockwise side, that is visible past `blockers` from a
+/// point with unit `normal`. `None` if the blockers cut it into too many pieces.
 pub(crate) fn visible_part(
     point: DVec3,
     normal: DVec3,
     emitter: &Corners,
     blockers: &[Corners],
-    room: &mut Pieces,
+    pieces: &mut Pieces,
 ) -> Option<Visible> {
     let [p, q, r] = emitter.map(|corner| corner - point);
-    // Behind the triangle, or in its plane.
+    // The point is behind the triangle or in its plane.
     if (q - p).cross(r - p).dot(p) >= 0.0 {
         return Some(Visible::default());
     }
-    room.begin(&[p, q, r])?;
-    room.clip(|corner| corner.dot(normal))?;
+    pieces.begin(&[p, q, r])?;
+    pieces.clip(|corner| corner.dot(normal))?;
     let mut hidden = false;
     for blocker in blockers {
         let Some(shadow) = Shadow::new(blocker.map(|corner| corner - point)) else { continue };
-        hidden |= room.cut(&shadow)?;
-        if room.list().is_empty() {
+        hidden |= pieces.cut(&shadow)?;
+        if pieces.list().is_empty() {
             break;
         }
     }
-    let factor = room.list().iter().map(|piece| lambert(normal, piece.corners())).sum::<f64>();
-    // The whole is at most 1.
+    let factor = pieces.list().iter().map(|piece| lambert(normal, piece.corners())).sum::<f64>();
+    // The emitter's whole form factor is at most 1, so the first comparison saves most computations of it.
     let is_gap = hidden && factor < GAP && factor < GAP * point_to_triangle(point, normal, emitter);
     Some(Visible { factor: if is_gap { 0.0 } else { factor.clamp(0.0, 1.0) }, hidden })
 }
@@ -54,24 +54,24 @@ mod tests {
     use crate::visibility::polygon::point_to_triangle;
 
     fn factor(point: DVec3, emitter: &Corners, blockers: &[Corners]) -> Visible {
-        let mut room = Pieces::new();
-        visible_part(point, DVec3::Y, emitter, blockers, &mut room).unwrap()
+        let mut pieces = Pieces::new();
+        visible_part(point, DVec3::Y, emitter, blockers, &mut pieces).unwrap()
     }
 
-    /// Looks down from a height.
+    /// A triangle that emits downwards from a height.
     fn lamp(height: f64) -> Corners {
         [[-1.0, -1.0], [1.5, -0.5], [0.0, 1.5]].map(|[x, z]| DVec3::new(x, height, z))
     }
 
     #[test]
-    fn nothing_between_is_lamberts_formula() {
+    fn without_blockers_it_is_lamberts_formula() {
         let emitter = lamp(2.0);
         let open = factor(DVec3::ZERO, &emitter, &[]);
         assert_eq!(
             open,
             Visible { factor: point_to_triangle(DVec3::ZERO, DVec3::Y, &emitter), hidden: false }
         );
-        // Beside it, behind it, behind the point, and edge on.
+        // Blockers beside the emitter, behind it, behind the point, and edge-on.
         let beside = [[5.0, 1.0, 0.0], [6.0, 1.0, 0.0], [5.0, 1.0, 1.0]].map(DVec3::from);
         let behind = lamp(3.0);
         let below = lamp(-1.0);
@@ -81,25 +81,27 @@ mod tests {
 
     #[test]
     fn a_sheet_with_straight_edges_hides_what_it_covers() {
-        // The same lamp at half the height, as large as it looks: all is hidden; at a third of the size, what the smaller one would send.
+        // The lamp scaled about the point to half the height hides all of it; at a third of that size, it hides as much
+        // light as it would send itself.
         let emitter = lamp(2.0);
         let near = emitter.map(|corner| 0.5 * corner);
         let all = factor(DVec3::ZERO, &emitter, &[near.map(|corner| corner * 1.0)]);
         assert!(all.factor < 1e-12 && all.hidden, "{all:?}");
         let small = near.map(|corner| DVec3::new(corner.x / 3.0, corner.y, corner.z / 3.0));
-        let left = factor(DVec3::ZERO, &emitter, &[small]);
+        let remaining = factor(DVec3::ZERO, &emitter, &[small]);
         let expected = point_to_triangle(DVec3::ZERO, DVec3::Y, &emitter)
             - point_to_triangle(DVec3::ZERO, DVec3::Y, &small);
-        assert!((left.factor - expected).abs() < 1e-14 && left.hidden, "{left:?} {expected}");
-        // Twice the same, or turned over, hides no more.
+        assert!((remaining.factor - expected).abs() < 1e-14 && remaining.hidden, "{remaining:?} {expected}");
+        // The same blocker a second time, turned over, hides no more.
         let [a, b, c] = small;
         let again = factor(DVec3::ZERO, &emitter, &[small, [a, c, b]]);
         assert!((again.factor - expected).abs() < 1e-14, "{again:?}");
     }
 
-    /// Area sampling with segments against the same triangles, as good as its own spread: 2^14 points of a (0, 2)-sequence.
+    /// Compares with area sampling by segments past the same triangles, within its error: 2^14 points of a (0,
+    /// 2)-sequence.
     #[test]
-    fn a_crowd_of_triangles_hides_what_segments_find_hidden() {
+    fn random_triangles_hide_the_part_that_segments_find_hidden() {
         let emitter = lamp(2.0);
         let sequence = Sequence::new(3, Stream::Test(77), 0);
         let mut some_hidden = 0;
@@ -110,7 +112,7 @@ mod tests {
             };
             let blockers: Vec<Corners> = (0..5).map(|t| [0, 1, 2].map(|c| corner(t, c))).collect();
             let point = DVec3::new(0.1, 0.0, -0.2);
-            let found = factor(point, &emitter, &blockers);
+            let visible = factor(point, &emitter, &blockers);
             let [p, q, r] = emitter;
             let area = 0.5 * (q - p).cross(r - p).length();
             let count = 1 << 14;
@@ -118,31 +120,32 @@ mod tests {
             for index in 0..count {
                 let [u, v, ..] = sequence.point(index, 2);
                 let (u, v) = triangle_point(u, v);
-                let apart = p + (q - p) * f64::from(u) + (r - p) * f64::from(v) - point;
+                let towards = p + (q - p) * f64::from(u) + (r - p) * f64::from(v) - point;
                 let crosses = |corners: &Corners| {
                     let [a, b, c] = corners.map(|corner| corner - point);
                     let normal = (b - a).cross(c - a);
-                    let t = normal.dot(a) / normal.dot(apart);
-                    let at = apart * t;
+                    let t = normal.dot(a) / normal.dot(towards);
+                    let at = towards * t;
                     let side = |from: DVec3, to: DVec3| (to - from).cross(at - from).dot(normal) > 0.0;
                     t > 0.0 && t < 1.0 && side(a, b) && side(b, c) && side(c, a)
                 };
                 if !blockers.iter().any(crosses) {
-                    sum += apart.y * apart.y / apart.length_squared().powi(2);
+                    sum += towards.y * towards.y / towards.length_squared().powi(2);
                 }
             }
             let expected = sum * area / std::f64::consts::PI / f64::from(count);
-            // Edges cross √N of N strata: 3 of N^-3/4 of what there is at most.
+            // Edges cross √N of N strata, so the relative error is of the order of N^-3/4; the bound is a few times
+            // that.
             let whole = point_to_triangle(point, DVec3::Y, &emitter);
-            assert!((found.factor - expected).abs() < 3e-3 * whole, "{crowd}: {found:?} {expected}");
-            some_hidden += u32::from(found.factor > 0.0 && found.factor < whole);
+            assert!((visible.factor - expected).abs() < 3e-3 * whole, "{crowd}: {visible:?} {expected}");
+            some_hidden += u32::from(visible.factor > 0.0 && visible.factor < whole);
         }
         assert!(some_hidden > 10, "{some_hidden}");
     }
 
     #[test]
-    fn what_meets_leaves_no_gap() {
-        // A screen before all of the lamp, cut into triangles that share corners, and one of a grid of f32 corners that meet in T's.
+    fn adjacent_blockers_leave_no_gap() {
+        // A screen in front of the whole lamp, of triangles whose f32 corners meet in T-junctions.
         let emitter = lamp(2.0);
         let sequence = Sequence::new(11, Stream::Test(78), 0);
         for index in 0..500 {
@@ -164,8 +167,8 @@ mod tests {
     }
 
     #[test]
-    fn the_horizon_cuts_and_scales_do_not_matter() {
-        // Half of the lamp is under the horizon; 2^k times all lengths is the same to the last bit.
+    fn the_horizon_clips_and_scaling_by_a_power_of_two_changes_no_bit() {
+        // Half of the lamp is below the horizon.
         let emitter = [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0], [1.0, 2.0, 0.0]].map(DVec3::from);
         let blocker = [[0.5, 0.3, -0.5], [0.5, 0.3, 0.5], [0.5, 2.0, 0.1]].map(DVec3::from);
         let one = factor(DVec3::ZERO, &emitter, &[blocker]);

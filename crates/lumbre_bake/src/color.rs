@@ -1,0 +1,8 @@
+//! Arithmetic of colours: radiance, irradiance and reflectance with a red, a green and a blue channel.
+
+use glam::Vec3;
+
+/// Mean of the three channels.
+pub(crate) fn channel_mean(color: Vec3) -> f32 {
+    color.element_sum() / 3.0
+}

@@ -1,0 +1,44 @@
+//! What the tree of emitters and the tree of punctual lights have in common: the kinds of nodes, the split of a node in
+//! two, and the apparent size of a node's bounding sphere. The trees themselves are `emitter_tree` and `light_tree`.
+
+use glam::Vec3;
+
+use crate::scene::Receiver;
+
+/// The kind of a node in a binary tree over sources.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum NodeKind {
+    /// One source, by its index.
+    Leaf(u32),
+    /// The indices of the two children.
+    Inner([u32; 2]),
+}
+
+/// Sorts sources along the widest axis of their positions; returns how many belong to the first half.
+pub(crate) fn split_at_median(sources: &mut [u32], position: impl Fn(&u32) -> Vec3) -> usize {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let mut positioned: Vec<(Vec3, u32)> = sources.iter().map(|source| (position(source), *source)).collect();
+    for (position, _) in &positioned {
+        (low, high) = (low.min(*position), high.max(*position));
+    }
+    let axis = (high - low).max_position();
+    positioned.sort_unstable_by(|a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
+    for (source, (_, sorted)) in sources.iter_mut().zip(positioned) {
+        *source = sorted;
+    }
+    sources.len() / 2
+}
+
+/// The sine of the angular radius at which a sphere, enlarged by `reach`, appears from a receiver; 1 from inside the
+/// sphere.
+pub(crate) fn apparent_sine(center: Vec3, radius: f32, receiver: &Receiver, reach: f32) -> f32 {
+    let distance = center.distance(receiver.position);
+    let size = radius + reach;
+    if size < distance { size / distance } else { 1.0 }
+}
+
+/// Keeps in [0, 1) a random number that was rescaled to it, despite rounding.
+#[inline]
+pub(crate) fn clamp_below_one(u: f32) -> f32 {
+    u.clamp(0.0, 1.0 - f32::EPSILON)
+}
