@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use bevy_ecs::world::World;
 use glam::{DVec2, DVec3};
 use lumbre_bake::{Bake, BakeOptions, Density, TexelErrors};
-use lumbre_scene::{GlobalTransform, Lightmap, Mesh};
+use lumbre_scene::{GlobalTransform, Lightmap, Mesh, Name};
 
 use crate::held_out::path_tracer::{Effort, PathTracer};
 use crate::held_out::random::Random;
@@ -16,6 +16,8 @@ use crate::held_out::scenes;
 
 /// Texels of a scene that are judged.
 const TEXELS: usize = 400;
+/// The texels farthest beyond what they state that are printed.
+const MISSES: usize = 24;
 /// Places along a texel's side at which its light is traced, and paths along a side of each place's grid of directions.
 const PLACES: u32 = 3;
 const PATHS: usize = 16;
@@ -24,6 +26,8 @@ const HALF: f64 = 0.499;
 
 /// A texel that shows one triangle and nothing else.
 struct Texel {
+    /// The object that it is on.
+    object: String,
     /// Irradiance and its stated error, W/m².
     value: DVec3,
     stated: f64,
@@ -43,8 +47,8 @@ impl Texel {
 /// The texels that lie wholly in one triangle of what shows them, and state an error.
 fn texels(world: &mut World) -> Vec<Texel> {
     let mut found = Vec::new();
-    let mut query = world.query::<(&Mesh, &Lightmap, &TexelErrors, &GlobalTransform)>();
-    for (mesh, map, errors, transform) in query.iter(world) {
+    let mut query = world.query::<(&Mesh, &Lightmap, &TexelErrors, &GlobalTransform, Option<&Name>)>();
+    for (mesh, map, errors, transform, name) in query.iter(world) {
         let (mesh, map) = (&mesh.0, &map.image);
         let size = DVec2::new(map.width.into(), map.height.into());
         for vertices in mesh.triangles() {
@@ -81,6 +85,7 @@ fn texels(world: &mut World) -> Vec<Texel> {
                         (place(corner), place(corner + DVec2::X), place(corner + DVec2::Y));
                     let value = map.texels[index].as_dvec3() * PI;
                     found.push(Texel {
+                        object: name.map_or_else(String::new, |name| name.to_string()),
                         value,
                         stated,
                         corner: own,
@@ -111,6 +116,7 @@ fn judged(name: &str, texels_per_meter: f64) -> [f64; 3] {
     Bake::new(&options).run(&mut world).expect("the scene bakes");
     let (mut all, mut random) = (texels(&mut world), Random::new(11));
     let mut found = [0.0; 3];
+    let mut misses = Vec::new();
     while found[0] < TEXELS as f64 && !all.is_empty() {
         let texel = all.swap_remove((random.uniform() * all.len() as f64) as usize);
         let places: Vec<(DVec3, DVec3)> = (0..PLACES * PLACES)
@@ -134,6 +140,14 @@ fn judged(name: &str, texels_per_meter: f64) -> [f64; 3] {
         let noise = (squares / (count * (count - 1.0))).sqrt();
         let apart = (texel.value - mean).length() / 3f64.sqrt();
         found[0] += 1.0;
+        let times = apart / texel.stated.hypot(noise);
+        if times > 2.0 {
+            let [value, truth] = [texel.value, mean].map(|light| light.element_sum() / 3.0);
+            misses.push((times, format!(
+                "  {times:5.1} times: {} at {:.2}: {value:.4} for {truth:.4}, stated {:.4}, traced to {noise:.4}",
+                texel.object, texel.point(0.5, 0.5), texel.stated
+            )));
+        }
         for (within, factor) in found[1..].iter_mut().zip([1.0, 0.5]) {
             *within += f64::from(u8::from(apart <= 2.0 * (factor * texel.stated).hypot(noise)));
         }
@@ -141,6 +155,8 @@ fn judged(name: &str, texels_per_meter: f64) -> [f64; 3] {
     let [count, within, halved] = found;
     let [within, halved] = [within, halved].map(|texels| 100.0 * texels / count);
     println!("{name}: {within:.1} % of {count} texels within twice theirs ({halved:.1} % if halved)");
+    misses.sort_by(|a, b| b.0.total_cmp(&a.0));
+    misses.iter().take(MISSES).for_each(|(_, miss)| println!("{miss}"));
     found
 }
 
