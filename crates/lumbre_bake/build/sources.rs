@@ -1,58 +1,63 @@
-//! One number for the source of everything that a baked texel depends on, so that a checkpoint or a finished map of another baker is
-//! told apart without anybody having to remember to count a version up: the sources of the project's own crates, and the versions and checksums
-//! that the lock file names for all others.
+//! One hash of the source code that a baked texel depends on: the sources of the project's own crates, and the versions
+//! and checksums that the lock file states for all others. With it, checkpoints and maps of another version of the
+//! baker are recognized without a version number that somebody would have to increment.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// This crate.
-const OWN: &str = "lumbre_bake";
-/// What those of the project are called.
-const PROJECT: &str = "lumbre_";
+const THIS_CRATE: &str = "lumbre_bake";
+/// The prefix of the names of the project's crates.
+const PROJECT_PREFIX: &str = "lumbre_";
 
-/// The sources.
+/// The sources that a baked texel depends on.
 pub struct Sources {
-    /// Of all of them.
     pub hash: u64,
-    /// Files and folders that they were read from.
+    /// The files and folders that were read; the build script has to run again when one of them changes.
     pub watched: Vec<PathBuf>,
 }
 
 impl Sources {
-    /// Of the crate whose manifest is in `own`. In a workspace its lock file says on what that depends, and the sources of the project's crates lie
-    /// beside this one. In a package of its own, where both are missing, its sources and its manifest count: the manifest names the versions.
-    pub fn of(own: &Path) -> std::io::Result<Self> {
-        let lock = ["Cargo.lock", "../../Cargo.lock"].map(|place| own.join(place));
-        let lock = lock.into_iter().find(|place| place.is_file());
+    /// Reads the sources of the crate whose manifest is in `crate_folder`. In a workspace, the lock file names the
+    /// dependencies, and the sources of the project's other crates are in the folders beside this one. A package that
+    /// was published by itself has neither: its sources and its manifest, which names the versions, are hashed.
+    pub fn of(crate_folder: &Path) -> std::io::Result<Self> {
+        let lock = ["Cargo.lock", "../../Cargo.lock"].map(|path| crate_folder.join(path));
+        let lock = lock.into_iter().find(|path| path.is_file());
         let packages = match &lock {
-            Some(place) => packages(&std::fs::read_to_string(place)?),
+            Some(path) => packages(&std::fs::read_to_string(path)?),
             None => BTreeMap::new(),
         };
-        let needed = needed(&packages);
-        let mut files = vec![("manifest".to_owned(), std::fs::read(own.join("Cargo.toml"))?)];
-        let mut watched = vec![own.join("Cargo.toml")];
+        let dependencies = transitive_dependencies(&packages);
+        let mut files = vec![("manifest".to_owned(), std::fs::read(crate_folder.join("Cargo.toml"))?)];
+        let mut watched = vec![crate_folder.join("Cargo.toml")];
         watched.extend(lock);
-        let mut crates = vec![OWN.to_owned()];
-        crates.extend(needed.iter().filter(|name| name.starts_with(PROJECT) && *name != OWN).cloned());
+        let mut crates = vec![THIS_CRATE.to_owned()];
+        crates.extend(
+            dependencies
+                .iter()
+                .filter(|name| name.starts_with(PROJECT_PREFIX) && *name != THIS_CRATE)
+                .cloned(),
+        );
         for name in &crates {
-            let beside = if name == OWN { own.to_owned() } else { own.with_file_name(name) };
-            let folder = beside.join("src");
-            // Elsewhere the version stands for it.
+            let root =
+                if name == THIS_CRATE { crate_folder.to_owned() } else { crate_folder.with_file_name(name) };
+            let folder = root.join("src");
+            // A crate whose sources are not there is represented by its version.
             if folder.is_dir() {
                 collect(&folder, &folder, name, &mut files)?;
                 watched.push(folder);
             }
         }
-        for name in &needed {
+        for name in &dependencies {
             for package in &packages[name] {
-                files.push((format!("package {name}"), package.told.clone().into_bytes()));
+                files.push((format!("package {name}"), package.identity.clone().into_bytes()));
             }
         }
         files.sort();
-        // FNV-1a: mistakes are to be told apart here, not attacks.
+        // FNV-1a is enough: the hash has to reveal accidental changes, not attacks.
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         for (name, text) in files {
-            // Line ends differ between checkouts.
+            // Line endings differ between checkouts.
             let text = text.into_iter().filter(|byte| *byte != b'\r');
             for byte in name.bytes().chain([0]).chain(text).chain([0]) {
                 hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
@@ -65,13 +70,13 @@ impl Sources {
 /// A package of a lock file.
 #[derive(Default)]
 struct Package {
-    /// Its version, where it comes from, and its checksum.
-    told: String,
-    /// By name: of several versions each counts.
+    /// The concatenation of its version, source and checksum.
+    identity: String,
+    /// Names without versions: a dependency stands for all versions of that name in the lock file.
     dependencies: Vec<String>,
 }
 
-/// The packages of a lock file, by name.
+/// Parses a lock file and returns its packages by name; a name has several packages if several versions are in use.
 fn packages(lock: &str) -> BTreeMap<String, Vec<Package>> {
     let mut packages: BTreeMap<String, Vec<Package>> = BTreeMap::new();
     for block in lock.split("[[package]]").skip(1) {
@@ -79,9 +84,9 @@ fn packages(lock: &str) -> BTreeMap<String, Vec<Package>> {
         for line in block.lines().map(str::trim) {
             match line.split_once(" = ") {
                 Some(("name", value)) => name = value.trim_matches('"').to_owned(),
-                Some(("version" | "source" | "checksum", value)) => package.told += value,
+                Some(("version" | "source" | "checksum", value)) => package.identity += value,
                 Some(_) => {}
-                // "name", or "name version" where there are several.
+                // A dependency is written as "name", or as "name version" if the name has several versions.
                 None if line.starts_with('"') => {
                     let dependency = line.trim_matches(['"', ',']).split(' ').next().unwrap_or_default();
                     package.dependencies.push(dependency.to_owned());
@@ -94,19 +99,20 @@ fn packages(lock: &str) -> BTreeMap<String, Vec<Package>> {
     packages
 }
 
-/// The names of all packages on which this crate depends, itself among them.
-fn needed(packages: &BTreeMap<String, Vec<Package>>) -> BTreeSet<String> {
-    let mut needed = BTreeSet::new();
-    let mut open = vec![OWN.to_owned()];
-    while let Some(name) = open.pop() {
+/// Returns the names of this crate and of all packages that it depends on, directly or indirectly.
+fn transitive_dependencies(packages: &BTreeMap<String, Vec<Package>>) -> BTreeSet<String> {
+    let mut dependencies = BTreeSet::new();
+    let mut pending = vec![THIS_CRATE.to_owned()];
+    while let Some(name) = pending.pop() {
         let Some(versions) = packages.get(&name) else { continue };
-        if needed.insert(name) {
-            open.extend(versions.iter().flat_map(|package| package.dependencies.iter().cloned()));
+        if dependencies.insert(name) {
+            pending.extend(versions.iter().flat_map(|package| package.dependencies.iter().cloned()));
         }
     }
-    needed
+    dependencies
 }
 
+/// Reads all Rust files below a folder. Each is named by the crate's name and its path relative to `root`.
 fn collect(
     folder: &Path,
     root: &Path,
@@ -118,8 +124,8 @@ fn collect(
         if path.is_dir() {
             collect(&path, root, name, files)?;
         } else if path.extension().is_some_and(|extension| extension == "rs") {
-            let below = path.strip_prefix(root).unwrap_or(&path).to_string_lossy().replace('\\', "/");
-            files.push((format!("{name}/{below}"), std::fs::read(&path)?));
+            let relative = path.strip_prefix(root).unwrap_or(&path).to_string_lossy().replace('\\', "/");
+            files.push((format!("{name}/{relative}"), std::fs::read(&path)?));
         }
     }
     Ok(())

@@ -1,5 +1,7 @@
-//! Bakes a glTF file, or a held-out scene by its name: `bake_file IN.glb|SCENE OUT.glb [--map-size N] [--draft|--reference] [--error X] [--time SECONDS] [--csv REFERENCE] [--maps FOLDER]`.
-//! With a reference it prints the error, with a folder it writes each map as a PNG to look at.
+//! Bakes a glTF file, or a held-out scene by its name: `bake_file IN.glb|SCENE OUT.glb [--map-size N]
+//! [--draft|--reference] [--error X] [--time SECONDS] [--csv REFERENCE] [--maps FOLDER]`.
+//!
+//! With a reference it prints the errors at the reference points; with a folder it writes each map as a PNG to look at.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -43,8 +45,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(csv) = csv {
         let comparison = common::compare(&mut world, &common::read_reference(&csv));
         eprintln!("{comparison}");
-        for (position, found, expected) in &comparison.worst {
-            eprintln!("  at {position:.3}: {found:.4} instead of {expected:.4}");
+        for (position, irradiance, expected) in &comparison.worst {
+            eprintln!("  at {position:.3}: {irradiance:.4} instead of {expected:.4}");
         }
     }
     if let Some(folder) = maps {
@@ -54,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Tone-mapped: the mean of what is lit becomes half grey.
+/// Writes the maps as PNG files, tone-mapped such that the mean of the lit texels is shown at half of full brightness.
 fn write_maps(world: &mut World, folder: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder)?;
     let maps = common::maps(world);

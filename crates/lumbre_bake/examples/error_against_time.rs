@@ -1,7 +1,9 @@
-//! The error of a bake against the time it takes: `error_against_time [--scene NAME] [--threads N] [--rounds N]` bakes the scenes that have
-//! converged reference points, each variant after the other, and prints a table of Markdown: the stated error, the true one, seconds of wall clock and of all processors.
+//! The error of a bake against the time it takes: `error_against_time [--scene NAME] [--threads N] [--rounds N]` bakes
+//! the scenes that have converged reference points in several variants and prints a Markdown table with the estimated
+//! error, the true error, and the seconds of wall clock and of all processors.
 //!
-//! `cargo run --release -p lumbre_bake --example error_against_time`. A table is one run: times of two runs are two machines.
+//! `cargo run --release -p lumbre_bake --example error_against_time`. Compare only times of the same run: the load of a
+//! machine differs from run to run.
 
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
@@ -14,7 +16,7 @@ use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-/// A scene with reference points, and the density that it is baked at.
+/// A scene with its reference points and the lightmap density that it is baked with.
 struct Scene {
     name: &'static str,
     model: &'static str,
@@ -37,9 +39,9 @@ const SCENES: [Scene; 2] = [
     },
 ];
 
-/// What is varied, and the errors that are asked of it.
+/// The variants of the options, each with the target errors that it is baked with.
 fn variants() -> Vec<(&'static str, BakeOptions, &'static [f64])> {
-    // What it would estimate is measured here.
+    // The resolution error needs no estimate: it is part of the true error that is measured here.
     let plain = BakeOptions { resolution_error: false, ..BakeOptions::default() };
     vec![
         ("default", plain, &[0.05, 0.014, 0.01, 0.007, 0.005]),
@@ -73,18 +75,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         for (variant, options, errors) in variants() {
             for &error in errors {
                 let options = BakeOptions { density: scene.density, error, threads, ..options };
-                let (report, found, [seconds, processor]) = fastest(&model, &points, &options, rounds)?;
-                // The points' own noise is known and independent of the bake.
-                let rmse = (found.rmse.powi(2) - (noise / found.mean).powi(2)).max(0.0).sqrt();
+                let (report, comparison, [seconds, processor]) = fastest(&model, &points, &options, rounds)?;
+                // The noise of the reference is known and independent of the bake, so that its variance can be
+                // subtracted.
+                let rmse = (comparison.rmse.powi(2) - (noise / comparison.mean).powi(2)).max(0.0).sqrt();
                 let percent = [
                     error,
                     seconds / 100.0,
                     processor / 100.0,
                     report.estimated_error,
                     rmse,
-                    found.median,
-                    found.p95,
-                    found.bias,
+                    comparison.median,
+                    comparison.p95,
+                    comparison.bias,
                 ]
                 .map(|value| format!("{:.3}", 100.0 * value));
                 println!(
@@ -100,7 +103,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Bakes so many times; the one of the least time, wall clock and processor, since others may use the machine.
+/// Bakes `rounds` times and returns the bake that took the least processor time, with its seconds of wall clock and of
+/// processor time: other processes may slow a single bake down.
 fn fastest(
     model: &Path,
     points: &[common::ReferencePoint],
@@ -121,7 +125,7 @@ fn fastest(
     best.ok_or_else(|| "nothing was baked".into())
 }
 
-/// Root mean square of the standard errors that the points state of themselves, W/m².
+/// The root mean square of the standard errors that the reference file states for its points, W/m².
 fn noise_of_reference(path: &Path) -> Result<f64, Box<dyn Error>> {
     let text = std::fs::read_to_string(path)?;
     let numbers = text.lines().skip(1).flat_map(|line| line.split(',').skip(9).take(3));
@@ -133,11 +137,11 @@ fn noise_of_reference(path: &Path) -> Result<f64, Box<dyn Error>> {
     Ok(if count > 0.0 { (sum / count).sqrt() } else { 0.0 })
 }
 
-/// What this process has used of all processors, seconds: others that use the machine do not count. Linux tells it in hundredths in
-/// `/proc/self/stat`, as user and system time, fields 14 and 15; 0 elsewhere.
+/// The processor time that this process has used so far, in seconds, summed over all processors. On Linux, fields 14
+/// and 15 of `/proc/self/stat` give the user and the system time in hundredths of a second; elsewhere the result is 0.
 fn processor_seconds() -> f64 {
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // The second field is the program's name in brackets, which may hold spaces.
+    // The second field is the program's name in parentheses, which may contain spaces.
     let after = text.rsplit(')').next().unwrap_or_default();
     after.split_whitespace().skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>()
         / 100.0

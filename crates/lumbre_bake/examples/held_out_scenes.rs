@@ -1,6 +1,8 @@
-//! Writes the held-out scenes and, if asked, their reference: `held_out_scenes FOLDER [NAME …] [--points N]`.
-//! FOLDER gets NAME.glb, of rooms and halls NAME_small.glb (2⁻⁷) and NAME_large.glb (2¹⁰), too; with `--points` NAME.csv in the columns of the
-//! conformance suite, to 0.4 % of a point's own light where 58,000 paths suffice.
+//! Writes the held-out scenes and, on request, reference points: `held_out_scenes FOLDER [NAME …] [--points N]`.
+//!
+//! NAME.glb is written into FOLDER; for rooms and halls also NAME_small.glb (scaled by 2⁻⁷) and NAME_large.glb (by
+//! 2¹⁰). With `--points`, NAME.csv has the columns of the conformance suite; the standard error of a point is 0.4 % of
+//! its irradiance unless 58,000 paths leave more.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -26,27 +28,28 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(folder);
     std::fs::create_dir_all(&folder)?;
     for (name, scene, layout) in held_out::scenes::all() {
-        if !names.is_empty() && !names.iter().any(|wanted| *wanted == name) {
+        if !names.is_empty() && !names.iter().any(|requested| *requested == name) {
             continue;
         }
         let scales = [("", 1.0), ("_small", 1.0 / 128.0), ("_large", 1024.0)];
-        let judged_at_all = held_out::scenes::of_any_scale().iter().any(|(known, ..)| *known == name);
-        for (suffix, scale) in &scales[..if judged_at_all { 3 } else { 1 }] {
+        let all_scales = held_out::scenes::of_any_scale().iter().any(|(other, ..)| *other == name);
+        for (suffix, scale) in &scales[..if all_scales { 3 } else { 1 }] {
             let mut world = scene(layout, *scale);
             lumbre_scene::save(&mut world, &folder.join(format!("{name}{suffix}.glb")))?;
         }
         if let Some(count) = points {
             let started = Instant::now();
-            let tracer = PathTracer::new(&mut scene(layout, 1.0)).with_bounced(layout);
-            let found = tracer.points(count, Effort::reference(), 7 + layout);
-            held_out::reference_points::write(&folder.join(format!("{name}.csv")), &found)?;
-            eprintln!("{name}: {}, {:.0} s", described(&found), started.elapsed().as_secs_f64());
+            let tracer = PathTracer::new(&mut scene(layout, 1.0)).with_indirect_cache(layout);
+            let reference = tracer.points(count, Effort::reference(), 7 + layout);
+            held_out::reference_points::write(&folder.join(format!("{name}.csv")), &reference)?;
+            eprintln!("{name}: {}, {:.0} s", summary(&reference), started.elapsed().as_secs_f64());
         }
     }
     Ok(())
 }
 
-fn described(points: &[Irradiance]) -> String {
+/// A line about the points: their number, mean irradiance, and relative standard errors.
+fn summary(points: &[Irradiance]) -> String {
     let mean = |point: &Irradiance| point.value.element_sum() / 3.0;
     let inside: Vec<_> = points.iter().filter(|point| point.inside).collect();
     let sum: f64 = inside.iter().map(|point| mean(point)).sum();
@@ -56,7 +59,7 @@ fn described(points: &[Irradiance]) -> String {
         .filter(|error| error.is_finite())
         .collect();
     errors.sort_by(f64::total_cmp);
-    let at =
+    let percentile =
         |share: f64| errors.get((share * errors.len() as f64) as usize).map_or(0.0, |error| 100.0 * error);
     let edges = inside.iter().filter(|point| point.edge).count();
     format!(
@@ -64,7 +67,7 @@ fn described(points: &[Irradiance]) -> String {
         points.len(),
         inside.len(),
         sum / inside.len() as f64,
-        at(0.5),
-        at(0.95)
+        percentile(0.5),
+        percentile(0.95)
     )
 }

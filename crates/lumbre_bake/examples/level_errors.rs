@@ -1,10 +1,14 @@
-//! How far baked levels are off where one looks: `level_errors [NAME|FILE.glb …] [--error X] [--time SECONDS] [--seed N] [--texels-per-meter N] [--points N]
-//! [--cache FOLDER] [--reference] [--anew|--paths] [--flip] [--pictures FOLDER] [--stages]` bakes each (all levels without a name) and prints one row: errors relative to the light
-//! around a point, away from shadow edges, at reference points of the cache or the tests' folder (not with `--anew`), which are computed where there
-//! are none; with `--paths` by paths to their very end, unbiased and noisy.
+//! Measures the errors of baked levels in the region that a player sees: `level_errors [NAME|FILE.glb …] [--error X]
+//! [--time SECONDS] [--seed N] [--texels-per-meter N] [--points N] [--cache FOLDER] [--reference] [--anew|--paths]
+//! [--flip] [--pictures FOLDER] [--stages]`.
 //!
-//! With `--flip` the level's view is compared to that of a converged bake of the same texels, which the cache keeps, too; with `--pictures` the
-//! views are written, the converged one only with `--flip`.
+//! It bakes each level (all of them if none is named) and prints one row for it: errors at reference points away from
+//! shadow edges, relative to the light around a point. The reference points are read from the cache or from the tests'
+//! folder (not from the latter with `--anew`) and computed if there are none; with `--paths` they are computed by paths
+//! that no cached light cuts short, unbiased and noisy.
+//!
+//! With `--flip` the level's view is compared with that of a converged bake of the same texels, which is also stored in
+//! the cache; with `--pictures` the views are written, the converged one only with `--flip`.
 
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
@@ -22,22 +26,24 @@ mod common;
 mod held_out;
 
 use held_out::input::world_of;
-use held_out::judgement::{Judgement, judge};
+
 use held_out::path_tracer::{Effort, Irradiance, PathTracer};
+use held_out::point_errors::{self, PointErrors};
 use held_out::view::{View, write_png};
 use held_out::{reference_points, scenes};
 use lumbre_trace::flip::mean_flip;
 
-/// Pixels of a view.
+/// The size of a view in pixels.
 const WIDTH: usize = 640;
 const HEIGHT: usize = 400;
-/// Batches of 576 paths for a point with `--paths`, at most.
+/// The largest number of batches of 576 paths for a point with `--paths`.
 const MAX_BATCHES: usize = 1200;
-/// Points that are named.
+/// The number of worst points that are listed.
 const WORST: usize = 24;
-/// What a converged bake may take.
-const PATIENCE: Duration = Duration::from_secs(900);
+/// The time limit of a converged bake.
+const CONVERGED_TIME: Duration = Duration::from_secs(900);
 
+/// The command line.
 struct Request {
     options: BakeOptions,
     points: usize,
@@ -45,9 +51,10 @@ struct Request {
     flip: bool,
     pictures: Option<PathBuf>,
     stages: bool,
-    /// Whether the tests' points are left alone.
+    /// Whether the reference points in the tests' folder are ignored.
     anew: bool,
-    /// Whether new reference points are unbiased paths to their end, with far more noise.
+    /// Whether new reference points are computed by full paths, which are unbiased but far noisier than those that end
+    /// in cached light.
     paths: bool,
 }
 
@@ -95,32 +102,33 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for name in &names {
-        row(name, &request)?;
+        print_row(name, &request)?;
     }
     Ok(())
 }
 
-fn row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
+/// Bakes a level, measures it and prints its row.
+fn print_row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
     let build = || world_of(Path::new(name));
     let name = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
     let name = name.as_ref();
     let points = points(name, &mut build()?, request)?;
     let mut world = build()?;
     let report = baked(&mut world, &request.options)?;
-    let found = judge(&mut world, &points);
+    let errors = point_errors::measure(&mut world, &points);
     let flip = match request.flip || request.pictures.is_some() {
         true => compared_views(name, &mut world, build, request)?,
         false => "-".to_owned(),
     };
-    let away = found.local.away;
+    let away = errors.local.away_from_edges;
     let percent = [
-        away.own.median,
-        away.own.p95,
-        away.around.median,
-        away.around.p95,
-        away.around.rmse,
-        found.own_rmse(),
-        found.bias,
+        away.to_point.median,
+        away.to_point.p95,
+        away.to_log_average.median,
+        away.to_log_average.p95,
+        away.to_log_average.rmse,
+        errors.rmse_without_noise(),
+        errors.bias,
     ]
     .map(|x| format!("{:.2}", 100.0 * x));
     println!(
@@ -128,51 +136,52 @@ fn row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
         report.texels,
         report.seconds,
         100.0 * report.estimated_error,
-        found.local.mean,
-        found.local.outside,
+        errors.local.mean,
+        errors.local.outside,
         percent.join(" | "),
-        found.leaks.0,
-        found.leaks.1
+        errors.leaks.0,
+        errors.leaks.1
     );
     if request.stages {
-        println!("\n{found}\n{}\n{report}", found.local);
-        worst(&found, &points);
+        println!("\n{errors}\n{}\n{report}", errors.local);
+        print_worst(&errors, &points);
     }
     Ok(())
 }
 
-/// The points in the region, away from shadow edges, that are farthest off, relative to their own light.
-fn worst(found: &Judgement, points: &[Irradiance]) {
+/// Prints percentiles of the signed errors of the points in the region and away from shadow edges, relative to their
+/// own light, and lists the worst of these points.
+fn print_worst(errors: &PointErrors, points: &[Irradiance]) {
     let counts = |position: DVec3| points.iter().any(|p| p.position == position && p.inside && !p.edge);
-    let grey = |light: DVec3| light.element_sum() / 3.0;
-    let mut rows: Vec<(f64, &[DVec3; 5])> = found
+    let channel_mean = |light: DVec3| light.element_sum() / 3.0;
+    let mut rows: Vec<(f64, &[DVec3; 5])> = errors
         .rows
         .iter()
-        .filter(|row| counts(row[0]) && grey(row[3]) > 0.0)
-        .map(|row| ((grey(row[2]) - grey(row[3])) / grey(row[3]), row))
+        .filter(|row| counts(row[0]) && channel_mean(row[3]) > 0.0)
+        .map(|row| ((channel_mean(row[2]) - channel_mean(row[3])) / channel_mean(row[3]), row))
         .collect();
     if rows.is_empty() {
         return;
     }
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let at = |share: f64| 100.0 * rows[((rows.len() - 1) as f64 * share) as usize].0;
+    let percentile = |share: f64| 100.0 * rows[((rows.len() - 1) as f64 * share) as usize].0;
     println!(
         "signed errors of {} points, relative to their own light: {:+.2}, {:+.2}, {:+.2}, {:+.2}, {:+.2} % at the 5th, 25th, 50th, 75th and 95th percentile",
         rows.len(),
-        at(0.05),
-        at(0.25),
-        at(0.5),
-        at(0.75),
-        at(0.95)
+        percentile(0.05),
+        percentile(0.25),
+        percentile(0.5),
+        percentile(0.75),
+        percentile(0.95)
     );
     rows.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
-    for (off, [position, normal, value, expected, error]) in rows.into_iter().take(WORST) {
+    for (relative_error, [position, normal, value, expected, error]) in rows.into_iter().take(WORST) {
         println!(
             "  {:+7.2} % at {position:.3}, normal {normal:.1}: {:.4}, expected {:.4} ± {:.4}",
-            100.0 * off,
-            grey(*value),
-            grey(*expected),
-            grey(*error)
+            100.0 * relative_error,
+            channel_mean(*value),
+            channel_mean(*expected),
+            channel_mean(*error)
         );
     }
 }
@@ -181,12 +190,13 @@ fn baked(world: &mut World, options: &BakeOptions) -> Result<BakeReport, Box<dyn
     Ok(Bake::new(options).run(world)?)
 }
 
-/// Those that the tests keep or the cache, or new ones.
+/// Reads the level's reference points from the cache or the tests' folder; if there are none, computes them and stores
+/// them in the cache.
 fn points(name: &str, world: &mut World, request: &Request) -> Result<Vec<Irradiance>, Box<dyn Error>> {
-    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
+    let tests_folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
     let file = |folder: &Path| folder.join(name).with_extension("csv");
-    let kept = if request.anew { None } else { Some(&kept) };
-    for folder in request.cache.iter().chain(kept) {
+    let tests_folder = if request.anew { None } else { Some(&tests_folder) };
+    for folder in request.cache.iter().chain(tests_folder) {
         if file(folder).exists() {
             return Ok(reference_points::read(&file(folder)));
         }
@@ -194,25 +204,26 @@ fn points(name: &str, world: &mut World, request: &Request) -> Result<Vec<Irradi
     let tracer = PathTracer::new(world);
     let (tracer, effort) = match request.paths {
         true => (tracer, Effort { batches: [16, MAX_BATCHES], ..Effort::reference() }),
-        false => (tracer.with_bounced(7), Effort::reference()),
+        false => (tracer.with_indirect_cache(7), Effort::reference()),
     };
-    let found = tracer.points(request.points, effort, 7);
+    let points = tracer.points(request.points, effort, 7);
     if let Some(folder) = &request.cache {
-        reference_points::write(&file(folder), &found)?;
+        reference_points::write(&file(folder), &points)?;
     }
-    Ok(found)
+    Ok(points)
 }
 
-/// FLIP between the views of a bake and of a converged one, both exposed for the latter; without the flag only the picture.
+/// The mean FLIP error between the views of this bake and of a converged one, both with the exposure of the latter.
+/// Without `--flip` it only writes the picture of this bake and returns a dash.
 fn compared_views(
     name: &str,
     world: &mut World,
     scene: impl Fn() -> Result<World, lumbre_scene::LoadError>,
     request: &Request,
 ) -> Result<String, Box<dyn Error>> {
-    let own = View::of(world, WIDTH, HEIGHT).ok_or("a level without a camera")?;
+    let view = View::of(world, WIDTH, HEIGHT).ok_or("a level without a camera")?;
     if let (Some(folder), false) = (&request.pictures, request.flip) {
-        write_png(&own.exposed(own.exposure()), &folder.join(format!("{name}.png")))?;
+        write_png(&view.exposed(view.exposure()), &folder.join(format!("{name}.png")))?;
         return Ok("-".to_owned());
     }
     let density = match request.options.density {
@@ -227,7 +238,7 @@ fn compared_views(
             let options = BakeOptions {
                 quality: Quality::Reference,
                 error: 2e-3,
-                time: Some(PATIENCE),
+                time: Some(CONVERGED_TIME),
                 seed: 99,
                 ..request.options
             };
@@ -241,12 +252,12 @@ fn compared_views(
         }
     };
     let exposure = converged.exposure();
-    let [own, converged] = [own, converged].map(|view| view.exposed(exposure));
+    let [view, converged] = [view, converged].map(|view| view.exposed(exposure));
     if let Some(folder) = &request.pictures {
-        write_png(&own, &folder.join(format!("{name}.png")))?;
+        write_png(&view, &folder.join(format!("{name}.png")))?;
         write_png(&converged, &folder.join(format!("{name}_converged.png")))?;
     }
-    Ok(format!("{:.4}", mean_flip(&converged, &own)))
+    Ok(format!("{:.4}", mean_flip(&converged, &view)))
 }
 
 fn write_view(view: &View, file: &Path) -> Result<(), Box<dyn Error>> {

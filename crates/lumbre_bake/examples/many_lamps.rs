@@ -1,6 +1,7 @@
-//! What more lamps cost: `many_lamps [NAME …] [--error X] [--time SECONDS] [--stages] [--plot FILE.svg]` bakes one room under 1 to 10,000 lamps of the same power
-//! in all, under as many point lights, a bulb of 70,000 triangles and a screen of 4096 by 2048 texels, and prints a table. The plot shows the
-//! seconds of the first two against the number of lamps.
+//! How the time of a bake grows with the number of lamps: `many_lamps [NAME …] [--error X] [--time SECONDS] [--stages]
+//! [--plot FILE.svg]` bakes one room under 1 to 10,000 emissive squares of the same total power, under 1 to 10,000
+//! point lights, under a bulb of 70,000 triangles, and under a screen of 4096 by 2048 texels, and prints a table. The
+//! plot shows the seconds of the first two kinds against the number of lamps.
 
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
@@ -15,8 +16,8 @@ mod random;
 #[path = "../tests/held_out/scenes/mod.rs"]
 mod scenes;
 
-/// What a number of lamps of a kind took.
-struct Measured {
+/// The bake of a scene with a number of lamps of one kind.
+struct Measurement {
     kind: String,
     count: f64,
     report: BakeReport,
@@ -43,14 +44,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         "| scene | texels | seconds | against one | direct light s | stated % | million rays | mean E | ended |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    let mut measured: Vec<Measured> = Vec::new();
+    let mut measured: Vec<Measurement> = Vec::new();
     for name in &names {
         let (build, count) = scenes::find(name).ok_or_else(|| format!("{name} is no scene"))?;
         let report = Bake::new(&options).run(&mut build(count, 1.0))?;
         let kind = name.rsplit_once('_').map_or(name.as_str(), |(kind, _)| kind).to_owned();
-        // What is no number of lamps is held against one lamp.
-        let like = if kind == "points" { "points" } else { "lamps" };
-        let one = measured.iter().find(|one| one.kind == like && one.count == 1.0);
+        // The bulb and the screen are compared with one emissive square.
+        let baseline = if kind == "points" { "points" } else { "lamps" };
+        let one = measured.iter().find(|one| one.kind == baseline && one.count == 1.0);
         let ratio = one.map_or("-".to_owned(), |one| format!("{:.2}", report.seconds / one.report.seconds));
         let direct = report.stages.iter().filter(|stage| stage.stage == "direct light");
         println!(
@@ -66,10 +67,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         if stages {
             println!("\n{report}");
         }
-        measured.push(Measured { kind, count: count as f64, report });
+        measured.push(Measurement { kind, count: count as f64, report });
     }
     if let Some(path) = plot {
-        std::fs::write(path, drawn(&measured))?;
+        std::fs::write(path, plot_svg(&measured))?;
     }
     Ok(())
 }
@@ -77,8 +78,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 const SIZE: [f64; 2] = [560.0, 340.0];
 const MARGIN: f64 = 56.0;
 
-/// Seconds over the number of lamps, both logarithmic.
-fn drawn(measured: &[Measured]) -> String {
+/// Plots the seconds over the number of lamps as an SVG; both axes are logarithmic.
+fn plot_svg(measured: &[Measurement]) -> String {
     let kinds = [("lamps", "#c0392b", "emissive squares"), ("points", "#2c6fbb", "point lights")];
     let shown = || measured.iter().filter(|one| kinds.iter().any(|(kind, ..)| one.kind == *kind));
     let decades = |values: &mut dyn Iterator<Item = f64>| {

@@ -1,5 +1,6 @@
-//! What keeping samples spares, and what it costs in error: `moved_object IN.glb|SCENE NAME X Y Z [--error E] [--texels-per-meter D]` bakes a file (or a
-//! held-out scene by its name), moves the object of that name by so many metres, and bakes again: with the samples of the first bake, and whole.
+//! Measures what a rebake that reuses samples saves, and what it costs in error: `moved_object IN.glb|SCENE NAME X Y Z
+//! [--error E] [--texels-per-meter D]` bakes a file (or a held-out scene by its name), moves the object NAME by the
+//! given metres, and bakes again twice: with the samples of the first bake, and from scratch.
 
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
@@ -37,22 +38,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     let moved = || -> Result<World, Box<dyn Error>> {
         let mut world = input::world_of(Path::new(input))?;
         let mut named = world.query::<(&Name, &mut Transform)>();
-        let found = named.iter_mut(&mut world).find(|(own, _)| own.as_str() == name);
-        let (_, mut place) = found.ok_or_else(|| format!("{input} has no object {name}"))?;
+        let object = named.iter_mut(&mut world).find(|(object_name, _)| object_name.as_str() == name);
+        let (_, mut place) = object.ok_or_else(|| format!("{input} has no object {name}"))?;
         place.translation += by;
         Ok(world)
     };
     let (after, whole) = (moved()?, moved()?);
     let (_, first, samples) = baked(input::world_of(Path::new(input))?, None, &options)?;
-    let (again, kept, _) = baked(after, samples.as_ref(), &options)?;
-    let (whole, all, _) = baked(whole, None, &options)?;
-    let mut apart = (0.0, 0.0, 0.0);
+    let (again, rebaked, _) = baked(after, samples.as_ref(), &options)?;
+    let (whole, full, _) = baked(whole, None, &options)?;
+    let (mut squares, mut light, mut count) = (0.0, 0.0, 0.0);
     for (a, b) in again.iter().zip(&whole).filter(|(a, b)| a.1.is_finite() && b.1.is_finite()) {
-        apart.0 += (a.0 - b.0).length_squared() / 3.0;
-        apart.1 += b.0.element_sum() / 3.0;
-        apart.2 += 1.0;
+        squares += (a.0 - b.0).length_squared() / 3.0;
+        light += b.0.element_sum() / 3.0;
+        count += 1.0;
     }
-    for (what, report) in [("before", &first), ("again", &kept), ("whole", &all)] {
+    for (what, report) in [("before", &first), ("again", &rebaked), ("whole", &full)] {
         println!(
             "{what:>6}: {:7.2} s, {:6.1} million rays, states {:.3} %",
             report.seconds,
@@ -60,19 +61,19 @@ fn main() -> Result<(), Box<dyn Error>> {
             100.0 * report.estimated_error
         );
     }
-    if let Some(rebake) = &kept.rebake {
+    if let Some(rebake) = &rebaked.rebake {
         println!("{rebake}");
     }
     println!(
         "again and whole are {:.3} % of the mean apart; {:.2} of the time, {:.2} of the rays",
-        100.0 * f64::sqrt(apart.0 / apart.2) * apart.2 / apart.1,
-        kept.seconds / all.seconds,
-        kept.rays as f64 / all.rays as f64
+        100.0 * f64::sqrt(squares / count) * count / light,
+        rebaked.seconds / full.seconds,
+        rebaked.rays as f64 / full.rays as f64
     );
     Ok(())
 }
 
-/// Light and error of every texel.
+/// The value and the stated error of every texel.
 type Texels = Vec<(DVec3, f32)>;
 
 fn baked(

@@ -1,5 +1,6 @@
-//! What a bake of many patches really takes: `peak_memory TRIANGLES_ALONG_A_WALL MAP_SIZE [--memory BYTES] [--final]`. Tells the stages as they begin, and prints the
-//! estimate, the peak of the process (VmHWM of Linux) before and after, and the patches.
+//! Measures the memory that a bake of many patches uses: `peak_memory TRIANGLES_ALONG_A_WALL MAP_SIZE [--memory BYTES]
+//! [--final]`. It reports the stages as they begin and prints, as JSON, the estimate, the peak memory of the process
+//! (VmHWM on Linux) before and after the bake, and the patches.
 
 use std::error::Error;
 use std::io::Write;
@@ -60,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A cube seen from inside, each wall cut into `2 n²` triangles, with lightmap coordinates in a 3 x 2 grid.
+/// A cube seen from inside whose walls consist of `2 n²` triangles each, with lightmap coordinates in a 3 x 2 grid.
 fn room(n: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let (x, y, z) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 2.0);
@@ -79,7 +80,8 @@ fn room(n: u32) -> TriangleMesh {
     mesh
 }
 
-/// A square of `2 n²` triangles, seen from where its edges turn counter-clockwise.
+/// Adds a parallelogram of `2 n²` triangles; its front is the side from which the turn from edge `a` to edge `b` is
+/// counter-clockwise.
 fn wall(mesh: &mut TriangleMesh, n: u32, origin: Vec3, [a, b]: [Vec3; 2], uv: Vec2, uv_side: f32) {
     let first = mesh.positions.len() as u32;
     for row in 0..=n {
@@ -97,7 +99,7 @@ fn wall(mesh: &mut TriangleMesh, n: u32, origin: Vec3, [a, b]: [Vec3; 2], uv: Ve
     }
 }
 
-/// Peak resident bytes of this process.
+/// The peak resident memory of this process in bytes.
 fn peak() -> Result<u64, Box<dyn Error>> {
     let status = std::fs::read_to_string("/proc/self/status")?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:")).ok_or("no VmHWM")?;

@@ -1,4 +1,4 @@
-//! The examples run and do what they say.
+//! Runs examples of the crate and checks what they print and write.
 
 use std::process::Command;
 use std::sync::Arc;
@@ -8,23 +8,23 @@ use glam::Vec3;
 use lumbre_optics::{Light, Material};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
 
-/// Cargo builds examples beside the tests.
+/// Returns the command that runs an example. Cargo builds examples into a folder beside that of the tests.
 fn example(name: &str) -> Command {
-    let mut folder = std::env::current_exe().expect("a test knows where it is");
+    let mut folder = std::env::current_exe().expect("the path of the running test is known");
     folder.pop();
     folder.set_file_name("examples");
     Command::new(folder.join(name).with_extension(std::env::consts::EXE_EXTENSION))
 }
 
 #[test]
-fn moved_object_tells_what_was_kept() {
+fn moved_object_reports_what_was_baked_again() {
     let scene = ["rooms_0", "small crate", "0.1", "0", "0.1"];
     let coarse = ["--error", "0.1", "--texels-per-meter", "3"];
-    let ran = example("moved_object").args(scene).args(coarse).output().unwrap();
-    let said = String::from_utf8_lossy(&ran.stdout);
-    assert!(ran.status.success(), "{said}{}", String::from_utf8_lossy(&ran.stderr));
-    assert!(said.contains("baked again what changed: small crate (changed)"), "{said}");
-    assert!(said.contains("again and whole are"), "{said}");
+    let output = example("moved_object").args(scene).args(coarse).output().unwrap();
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{stdout}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(stdout.contains("baked again what changed: small crate (changed)"), "{stdout}");
+    assert!(stdout.contains("again and whole are"), "{stdout}");
     let unknown = example("moved_object").args(["rooms_0", "piano", "0", "0", "0"]).output().unwrap();
     assert!(!unknown.status.success());
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("has no object piano"));
@@ -37,14 +37,14 @@ fn bake_file_bakes_a_file() {
     let mut world = World::new();
     let floor = Arc::new(lumbre_mesh::shapes::cuboid(Vec3::new(3.0, 0.2, 3.0), 1));
     world.spawn((Mesh(floor), Material::matt(Vec3::splat(0.5)), StaticObject));
-    // Saved with `bake: dynamic` it would light nothing.
+    // The default, `BakeMode::Dynamic`, is not baked.
     let lamp = Light { bake: lumbre_optics::BakeMode::Static, ..Light::point(Vec3::ONE) };
     world.spawn((lamp, Transform::from_xyz(0.0, 2.0, 0.0)));
     lumbre_scene::save(&mut world, &input).unwrap();
 
-    let ran =
+    let run =
         example("bake_file").args([&input, &output]).args(["--draft", "--map-size", "16"]).output().unwrap();
-    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
 
     let mut baked = World::new();
     lumbre_scene::load(&mut baked, &output).unwrap();

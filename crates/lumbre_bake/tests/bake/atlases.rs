@@ -1,31 +1,28 @@
-//! Maps that share atlases show what maps of their own show.
+//! Lightmaps that are packed into shared atlases show the same light as separate maps.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::common;
+use crate::scene_parts::grey;
 use bevy_ecs::world::World;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use lumbre_bake::{Bake, BakeError, BakeOptions, BakeReport, Density, Quality, TexelErrors};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
-fn matt(reflectance: f32) -> Material {
-    let front = Surface { diffuse: Vec3::splat(reflectance), ..Surface::default() };
-    Material { front, ..Material::default() }
-}
-
-/// A floor, sixteen boxes that share a mesh, and a tile whose own coordinates fill the whole square, under a light.
+/// A floor, sixteen boxes that share a mesh, and a tile whose given coordinates fill the whole unit square, under a
+/// light.
 fn scene() -> World {
     let mut world = World::new();
     let floor = Mesh(Arc::new(shapes::plane(8.0, 8.0, 1, 1)));
-    world.spawn((Name::new("floor"), floor, matt(0.5), StaticObject));
+    world.spawn((Name::new("floor"), floor, grey(0.5, 0.0), StaticObject));
     let block = Mesh(Arc::new(shapes::cuboid(Vec3::splat(0.5), 1)));
     for (index, name) in (0..16).map(|index| (index, format!("box {index:02}"))) {
         let at =
             Transform::from_xyz(f64::from(index % 4) * 1.5 - 2.25, 0.5, f64::from(index / 4) * 1.5 - 2.25);
-        world.spawn((Name::new(name), block.clone(), matt(0.5), StaticObject, at));
+        world.spawn((Name::new(name), block.clone(), grey(0.5, 0.0), StaticObject, at));
     }
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let tile = TriangleMesh {
@@ -34,7 +31,7 @@ fn scene() -> World {
         indices: vec![0, 2, 1, 0, 3, 2],
         ..TriangleMesh::default()
     };
-    world.spawn((Name::new("tile"), Mesh(Arc::new(tile)), matt(0.5), StaticObject));
+    world.spawn((Name::new("tile"), Mesh(Arc::new(tile)), grey(0.5, 0.0), StaticObject));
     let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
     world.spawn((light, Transform::from_xyz(0.3, 2.5, 0.2)));
     world
@@ -50,12 +47,13 @@ fn run(world: &mut World, atlas_size: Option<u32>) -> Result<BakeReport, BakeErr
     Bake::new(&options).run(world)
 }
 
-/// By object: what is read, bilinearly, at points of each triangle, corners and edges among them; the map and its errors.
-type Read = BTreeMap<String, (Vec<DVec3>, String, usize)>;
+/// For each object: the filtered values at points of each of its triangles, corners and edges included; the name of its
+/// map; and the number of texels with a stated error.
+type Samples = BTreeMap<String, (Vec<DVec3>, String, usize)>;
 
-fn read(world: &mut World) -> Read {
+fn samples(world: &mut World) -> Samples {
     let mut query = world.query::<(&Name, &Mesh, &Lightmap, &TexelErrors)>();
-    let read = query.iter(world).map(|(name, mesh, map, errors)| {
+    let samples = query.iter(world).map(|(name, mesh, map, errors)| {
         assert_eq!(errors.0.len(), map.image.texels.len());
         let mut values = Vec::new();
         for triangle in mesh.0.triangles() {
@@ -70,15 +68,15 @@ fn read(world: &mut World) -> Read {
         let known = errors.0.iter().filter(|error| error.is_finite()).count();
         (name.to_string(), (values, map.image.name.clone(), known))
     });
-    read.collect()
+    samples.collect()
 }
 
 #[test]
-fn an_atlas_shows_what_maps_of_their_own_show() {
-    let mut alone = scene();
-    let report = run(&mut alone, None).expect("the scene bakes");
+fn an_atlas_shows_the_same_as_separate_maps() {
+    let mut separate = scene();
+    let report = run(&mut separate, None).expect("the scene bakes");
     assert_eq!((report.maps, report.atlases), (18, 0));
-    let expected = read(&mut alone);
+    let expected = samples(&mut separate);
     for (side, least_pages) in [(64, 1), (40, 2)] {
         let mut world = scene();
         let report = run(&mut world, Some(side)).expect("the scene bakes");
@@ -88,16 +86,16 @@ fn an_atlas_shows_what_maps_of_their_own_show() {
             assert!(name.starts_with("floor") || (map.width <= side && map.height <= side), "{name}");
             assert_eq!(map.texels.len(), (map.width * map.height) as usize);
         }
-        let found = read(&mut world);
-        assert_eq!(found.len(), 18);
-        // The floor's 97 texels a side keep their own map, and so does what would be alone on a page.
-        let own: Vec<_> = found.iter().filter(|(_, (_, map, _))| !map.starts_with("atlas-")).collect();
-        assert!(own.len() <= 2 && own.iter().any(|(name, _)| *name == "floor"));
-        assert_eq!(report.maps, report.atlases + own.len());
-        for (name, (values, _, known)) in &found {
+        let samples = samples(&mut world);
+        assert_eq!(samples.len(), 18);
+        // The floor with its 97 texels a side keeps its own map, and so does a map that would be alone on a page.
+        let outside: Vec<_> = samples.iter().filter(|(_, (_, map, _))| !map.starts_with("atlas-")).collect();
+        assert!(outside.len() <= 2 && outside.iter().any(|(name, _)| *name == "floor"));
+        assert_eq!(report.maps, report.atlases + outside.len());
+        for (name, (values, _, known)) in &samples {
             assert!(*known > 0);
             for (value, expected) in values.iter().zip(&expected[name].0) {
-                // Coordinates in another range round differently: 2^-24 of a page against a texel's slope.
+                // Coordinates in another range are rounded differently, by 2^-24 of a page.
                 assert!((*value - *expected).abs().max_element() < 1e-4, "{name}: {value} {expected}");
             }
         }
@@ -105,7 +103,7 @@ fn an_atlas_shows_what_maps_of_their_own_show() {
 }
 
 #[test]
-fn atlases_survive_the_file_and_the_same_bits_come_again() {
+fn atlases_survive_saving_and_bakes_repeat_bit_for_bit() {
     let [mut world, mut again] = [scene(), scene()];
     let report = run(&mut world, Some(64)).expect("the scene bakes");
     run(&mut again, Some(64)).expect("the scene bakes");

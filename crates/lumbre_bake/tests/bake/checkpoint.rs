@@ -23,23 +23,23 @@ fn options() -> BakeOptions {
     }
 }
 
-/// Written at every chance.
+/// A checkpoint that is written as often as possible.
 fn checkpoint(path: &Path, resume: bool) -> Checkpoint {
     Checkpoint { interval: Duration::ZERO, ..Checkpoint::new(path, resume) }
 }
 
-/// More than there is.
+/// A fraction of the bake that is never reached.
 const NEVER: f32 = 2.0;
 
-/// Bakes until so much of the whole is done.
+/// Bakes with a checkpoint until this fraction of the whole bake is done.
 fn interrupted(
-    kept: &Checkpoint,
+    saved: &Checkpoint,
     options: &BakeOptions,
     fraction: f32,
 ) -> (World, Result<BakeReport, BakeError>) {
     let mut world = corner();
     let result = Bake::new(options)
-        .checkpoint(kept)
+        .checkpoint(saved)
         .progress(|progress| {
             if progress.fraction >= fraction { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
@@ -59,14 +59,14 @@ fn resumed_after_any_interruption_it_ends_with_the_same_bits() {
     let path = folder.path().join("checkpoint");
     let (expected, report) = whole(&options());
     assert!(!expected.is_empty());
-    // In every stage, and in the midst of the long ones.
+    // These fractions interrupt every stage, and the long ones in their middle.
     for stop in [0.0, 0.1, 0.3, 0.38, 0.42, 0.6, 0.95] {
         let (mut world, result) = interrupted(&checkpoint(&path, false), &options(), stop);
         assert!(matches!(result, Err(BakeError::Cancelled { .. })), "{stop}: {result:?}");
         assert!(bits(&mut world).is_empty(), "an interrupted bake leaves the world as it was");
-        // On another number of threads, and interrupted once more.
+        // Resume with another number of threads, and interrupt once more. The length of a block of work depends on the
+        // machine's speed, so that this bake may already complete.
         let fewer = BakeOptions { threads: Some(1), ..options() };
-        // Blocks are as long as the machine is fast: this may already be the end.
         let (_, result) = interrupted(&checkpoint(&path, true), &fewer, stop + 0.1);
         assert!(matches!(result, Ok(_) | Err(BakeError::Cancelled { .. })), "{stop}: {result:?}");
         let (mut world, result) = interrupted(&checkpoint(&path, true), &options(), NEVER);
@@ -79,26 +79,26 @@ fn resumed_after_any_interruption_it_ends_with_the_same_bits() {
         );
         assert_eq!(resumed.estimated_error.to_bits(), report.estimated_error.to_bits());
     }
-    let kept = checkpoint(&path, true);
-    kept.remove().unwrap();
-    kept.remove().unwrap();
+    let saved = checkpoint(&path, true);
+    saved.remove().unwrap();
+    saved.remove().unwrap();
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left beside it");
 }
 
 #[test]
-fn every_stage_may_be_interrupted_in_its_midst() {
-    // Where the callback is asked, by stage: the n-th time is one chance to end it.
-    let mut asked = Vec::new();
+fn every_stage_can_be_interrupted_in_its_middle() {
+    // The stage of each progress call; each call is a chance to interrupt the bake.
+    let mut calls = Vec::new();
     Bake::new(&options())
         .progress(|progress| {
-            asked.push(progress.stage);
+            calls.push(progress.stage);
             ControlFlow::Continue(())
         })
         .run(&mut corner())
         .unwrap();
-    let times = |stage: &str| asked.iter().filter(|own| **own == stage).count();
-    // The beginning of a stage asks, and every chunk: of a scene as small as this one there may be a single one, except where a stage
-    // has several parts.
+    let times = |stage: &str| calls.iter().filter(|other| **other == stage).count();
+    // There is a call at the beginning of a stage and one for every chunk of it. In a scene this small, a stage may
+    // have a single chunk, unless it consists of several parts.
     for (stage, least) in [
         ("direct light", 2),
         ("form factors", 2),
@@ -110,21 +110,21 @@ fn every_stage_may_be_interrupted_in_its_midst() {
         assert!(times(stage) >= least, "{stage} is asked {} times", times(stage));
     }
     for stage in ["final gather", "texels", "seams"] {
-        for wanted in 0..times(stage) {
-            let (mut world, mut seen) = (corner(), 0);
+        for stop in 0..times(stage) {
+            let (mut world, mut count) = (corner(), 0);
             let result = Bake::new(&options())
                 .progress(|progress| {
-                    seen += usize::from(progress.stage == stage);
-                    if seen > wanted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                    count += usize::from(progress.stage == stage);
+                    if count > stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
                 })
                 .run(&mut world);
-            // How many chunks there are depends on the machine: the last of them may be missing.
+            // The number of chunks depends on the machine's speed: the last of them may not occur in this bake.
             match result {
-                Err(BakeError::Cancelled { stage: found }) => assert_eq!(found, stage),
-                other => assert!(stage == "final gather" && other.is_ok(), "{stage} {wanted}: {other:?}"),
+                Err(BakeError::Cancelled { stage: cancelled }) => assert_eq!(cancelled, stage),
+                other => assert!(stage == "final gather" && other.is_ok(), "{stage} {stop}: {other:?}"),
             }
             assert!(bits(&mut world).is_empty() || stage == "final gather");
-            if stage == "final gather" && wanted > 6 {
+            if stage == "final gather" && stop > 6 {
                 break;
             }
         }
@@ -132,18 +132,18 @@ fn every_stage_may_be_interrupted_in_its_midst() {
 }
 
 #[test]
-fn a_complete_checkpoint_holds_all_the_long_work() {
+fn a_complete_checkpoint_contains_all_the_expensive_work() {
     let folder = tempfile::tempdir().unwrap();
-    let kept = checkpoint(&folder.path().join("checkpoint"), true);
-    let (mut world, result) = interrupted(&kept, &options(), NEVER);
+    let saved = checkpoint(&folder.path().join("checkpoint"), true);
+    let (mut world, result) = interrupted(&saved, &options(), NEVER);
     let first = result.unwrap();
     assert!(first.warnings.iter().any(|warning| warning.contains("there is no such checkpoint")));
-    let length = fs::metadata(&kept.path).unwrap().len();
-    let (mut again, result) = interrupted(&kept, &options(), NEVER);
+    let length = fs::metadata(&saved.path).unwrap().len();
+    let (mut again, result) = interrupted(&saved, &options(), NEVER);
     let second = result.unwrap();
     assert!(bits(&mut world) == bits(&mut again));
     assert!(second.resumed_seconds > 0.0 && second.seconds > second.resumed_seconds);
-    assert_eq!(fs::metadata(&kept.path).unwrap().len(), length, "nothing was computed that had to be kept");
+    assert_eq!(fs::metadata(&saved.path).unwrap().len(), length, "nothing was computed that had to be kept");
 }
 
 #[test]
@@ -163,15 +163,15 @@ fn whatever_became_of_the_file_the_bits_are_the_same() {
         assert!(again.warnings.is_empty() && again.resumed_seconds > 0.0, "{what}: the file is whole again");
         report.warnings
     };
-    let said = |warnings: &[String], what: &str| {
+    let expect_warning = |warnings: &[String], what: &str| {
         assert!(warnings.iter().any(|warning| warning.contains(what)), "{what}: {warnings:?}");
     };
-    // Cut short: in the magic, in the header, in a block's length, in blocks.
+    // Files that are cut off in the magic number, in the header, in a block's length, and in blocks.
     for end in [0, 5, 20, 76, 80, 100, sound.len() / 3, sound.len() / 2, sound.len() - 1] {
         let warnings = resumed(&sound[..end], &format!("cut at {end}"));
         assert!(end == 76 || warnings.iter().any(|w| w.contains("cut short")), "{end}: {warnings:?}");
     }
-    // A bit that has changed: in the identity, in a length, in values, in the last checksum.
+    // Files with one flipped bit in the identity, in a length, in values, and in the last checksum.
     for at in [30, 79, 81, 200, sound.len() / 2, sound.len() - 1] {
         let mut bytes = sound.clone();
         bytes[at] ^= 0x10;
@@ -180,13 +180,13 @@ fn whatever_became_of_the_file_the_bits_are_the_same() {
     }
     let mut bytes = sound.clone();
     bytes[8] = 200;
-    said(&resumed(&bytes, "version"), "version 200");
-    // Rubbish after the end: nobody reads it.
+    expect_warning(&resumed(&bytes, "version"), "version 200");
+    // Garbage after the end is not read.
     assert!(resumed(&[&sound[..], &[0xff; 100]].concat(), "rubbish").is_empty());
-    // An absurd length allocates nothing.
+    // An absurd length must not be allocated.
     let mut bytes = sound.clone();
     bytes[76..84].copy_from_slice(&u64::MAX.to_le_bytes());
-    said(&resumed(&bytes, "length"), "cut short");
+    expect_warning(&resumed(&bytes, "length"), "cut short");
 }
 
 #[test]
@@ -203,20 +203,20 @@ fn a_checkpoint_of_another_bake_is_not_continued() {
 }
 
 #[test]
-fn what_cannot_be_a_checkpoint_is_an_error_before_the_work() {
+fn an_unusable_checkpoint_is_an_error_before_the_bake() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| checkpoint(&folder.path().join(name), true);
-    let refused = |kept: &Checkpoint| match interrupted(kept, &options(), NEVER).1 {
+    let refused = |saved: &Checkpoint| match interrupted(saved, &options(), NEVER).1 {
         Err(BakeError::Checkpoint { path, source }) => {
-            assert_eq!(path, kept.path);
+            assert_eq!(path, saved.path);
             source
         }
         other => panic!("{other:?}"),
     };
     fs::write(at("letter").path, b"Dear Sir").unwrap();
     for resume in [true, false] {
-        let kept = Checkpoint { resume, ..at("letter") };
-        assert_eq!(refused(&kept), CheckpointError::Foreign);
+        let saved = Checkpoint { resume, ..at("letter") };
+        assert_eq!(refused(&saved), CheckpointError::Foreign);
     }
     assert_eq!(fs::read(at("letter").path).unwrap(), b"Dear Sir", "somebody else's file is left alone");
     fs::create_dir(at("folder").path).unwrap();

@@ -1,4 +1,4 @@
-//! The content hash: equal for equal scenes, other for everything that may change a texel.
+//! The content hash is equal for equal scenes and differs for every change that may change a texel.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -45,14 +45,14 @@ fn mesh(world: &mut World, change: impl FnOnce(&mut lumbre_mesh::TriangleMesh)) 
     change(Arc::make_mut(&mut mesh.0));
 }
 
-/// Something dynamic on the floor's edge: the probes' grid holds it.
-fn moving(world: &mut World, at: f64) {
+/// Adds a dynamic object at the floor's edge, which the grid of probes has to enclose.
+fn add_dynamic_ball(world: &mut World, at: f64) {
     let ball = Arc::new(lumbre_mesh::shapes::uv_sphere(0.3, 8, 4));
     let place = Transform::from_xyz(at, 0.5, 2.5);
     world.spawn((Mesh(ball), Material::default(), DynamicObject, place));
 }
 
-/// The floor's texture in one slot or the other.
+/// The hash of the scene with a textured floor, after a change of its textures.
 fn textured(change: impl FnOnce(&mut MaterialTextures)) -> ContentHash {
     hash(|world| {
         let image = Image { name: "tiles".into(), width: 2, height: 1, rgba: vec![9; 8] };
@@ -84,7 +84,7 @@ fn textured(change: impl FnOnce(&mut MaterialTextures)) -> ContentHash {
 }
 
 #[test]
-fn all_of_a_texture_that_is_read_changes_the_hash() {
+fn everything_of_a_texture_that_is_read_changes_the_hash() {
     type Change = fn(&mut TextureReference);
     let changes: &[(&str, Change)] = &[
         ("pixel", |t| Arc::make_mut(&mut t.image).rgba[5] ^= 1),
@@ -100,12 +100,12 @@ fn all_of_a_texture_that_is_read_changes_the_hash() {
         ("scale u", |t| t.scale.x += 1e-6),
         ("scale v", |t| t.scale.y += 1e-3),
     ];
-    let mut seen = vec![("none of it", textured(|_| {})), ("no texture", hash(|_| {}))];
+    let mut hashes = vec![("none of it", textured(|_| {})), ("no texture", hash(|_| {}))];
     let mut add = |what, changed| {
-        for (other, known) in &seen {
+        for (other, known) in &hashes {
             assert_ne!(changed, *known, "{what} and {other}");
         }
-        seen.push((what, changed));
+        hashes.push((what, changed));
     };
     for (what, change) in changes {
         add(what, textured(|textures| change(textures.base_color.as_mut().unwrap())));
@@ -122,20 +122,20 @@ fn all_of_a_texture_that_is_read_changes_the_hash() {
 }
 
 #[test]
-fn what_moves_counts_only_where_probes_are_called_for() {
+fn dynamic_objects_matter_only_if_probes_are_baked() {
     let never = BakeOptions { probes: Probes::Never, ..BakeOptions::default() };
     let mut still = corner();
     let mut moved = corner();
-    moving(&mut moved, 0.0);
+    add_dynamic_ball(&mut moved, 0.0);
     let hash = |world: &mut World| content_hash(world, &never).unwrap();
     assert_eq!(hash(&mut still), hash(&mut moved));
     let lamp = object(&mut moved, "lamp");
     moved.entity_mut(lamp).insert(EmissiveLight);
     assert_eq!(hash(&mut still), hash(&mut moved));
-    // A copy of it inside its box changes nothing of the grid.
+    // A copy of the ball in the same place does not change the grid of probes.
     let automatic = BakeOptions::default();
     let one = content_hash(&mut moved, &automatic).unwrap();
-    moving(&mut moved, 0.0);
+    add_dynamic_ball(&mut moved, 0.0);
     assert_eq!(one, content_hash(&mut moved, &automatic).unwrap());
 }
 
@@ -235,10 +235,10 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
             let crate_ = object(world, "box");
             world.entity_mut(crate_).insert(LightmapScale(2.0));
         }),
-        ("something moves", |world| moving(world, 0.0)),
-        ("it moves elsewhere", |world| moving(world, 1e-9)),
+        ("something moves", |world| add_dynamic_ball(world, 0.0)),
+        ("it moves elsewhere", |world| add_dynamic_ball(world, 1e-9)),
         ("and a face shines in real time", |world| {
-            moving(world, 0.0);
+            add_dynamic_ball(world, 0.0);
             let lamp = object(world, "lamp");
             world.entity_mut(lamp).insert(EmissiveLight);
         }),
@@ -253,21 +253,22 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
             world.entity_mut(crate_).insert(DynamicObject);
         }),
     ];
-    let mut seen = vec![("nothing", hash(|_| {}))];
+    let mut hashes = vec![("nothing", hash(|_| {}))];
     for (what, change) in changes {
         let changed = hash(change);
-        for (other, known) in &seen {
+        for (other, known) in &hashes {
             assert_ne!(changed, *known, "{what} and {other}");
         }
-        seen.push((what, changed));
+        hashes.push((what, changed));
     }
-    // What is hidden is not there.
+    // Hiding an object has the same effect as removing it.
     let hidden = hash(|world| {
         let crate_ = object(world, "box");
         world.entity_mut(crate_).insert(Hidden);
     });
-    assert!(seen.contains(&("gone", hidden)));
-    // Whoever adds a field adds it here and below.
+    assert!(hashes.contains(&("gone", hidden)));
+    // The pattern names every field, so that a new option does not compile until it is added here and to the list
+    // below.
     let default = BakeOptions::default();
     let BakeOptions {
         density: _,
@@ -312,10 +313,10 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
     ];
     for (what, options) in options {
         let changed = content_hash(&mut corner(), &options).unwrap();
-        for (other, known) in &seen {
+        for (other, known) in &hashes {
             assert_ne!(changed, *known, "{what} and {other}");
         }
-        seen.push((what, changed));
+        hashes.push((what, changed));
     }
 }
 

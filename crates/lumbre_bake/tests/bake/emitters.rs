@@ -1,10 +1,11 @@
-//! Emissive surfaces that are hard to sample: tiny, far brighter than others, of many triangles, textured. Each against a closed
-//! form or a sum of its own.
+//! Emissive surfaces and lights that are hard to sample: tiny, far brighter than others, of many triangles, textured.
+//! Each is compared with a closed form or an independent sum.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::common;
+use crate::common::shapes::room;
 use crate::scene_parts::grey;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
@@ -21,7 +22,7 @@ fn run(world: &mut World, side: u32) -> BakeReport {
     Bake::new(&options).run(world).expect("the scene bakes")
 }
 
-/// A horizontal square of a side about a place, looking up or down.
+/// A horizontal square with texture coordinates about a given centre, looking up or down.
 fn square(middle: Vec3, side: f32, up: bool) -> TriangleMesh {
     let h = 0.5 * side;
     let corners = [[-h, -h], [-h, h], [h, h], [h, -h]];
@@ -37,7 +38,7 @@ fn spawn(world: &mut World, mesh: TriangleMesh, material: Material) {
     world.spawn((Mesh(Arc::new(mesh)), material, StaticObject));
 }
 
-/// Points of the floor y = 0 about x = `middle`, with what they should receive.
+/// Points of the floor y = 0 about x = `middle` with their expected irradiance.
 fn points(middle: f64, value: impl Fn(DVec3) -> f64) -> Vec<common::ReferencePoint> {
     let point = |i: i32| {
         let position = DVec3::new(
@@ -52,7 +53,8 @@ fn points(middle: f64, value: impl Fn(DVec3) -> f64) -> Vec<common::ReferencePoi
 
 #[test]
 fn a_tiny_bright_emitter() {
-    // A millimetre across, a million times as bright as a lamp of a metre: E = L A cos⁴ θ / h², the rest of its size being 10⁻⁶.
+    // A lamp of a millimetre that is a million times as bright as one of a metre with the same power: E = L A cos⁴ θ /
+    // h²; the effect of its size is of the order of 10⁻⁶.
     let (side, radiance, height) = (1e-3f32, 1e6f32, 1.0f32);
     let mut world = World::new();
     spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.5, 0.0));
@@ -61,19 +63,17 @@ fn a_tiny_bright_emitter() {
     let power = f64::from(radiance) * f64::from(side).powi(2);
     let found = common::compare(&mut world, &points(0.0, |p| power / (1.0 + p.x * p.x + p.z * p.z).powi(2)));
     println!("{found}");
-    // Interpolated between texels of 1/40 m: h²/8 |E''| is 0.03 %.
+    // The error of interpolation between texels of h = 1/40 m, h²/8 |E''|, is 0.03 %.
     assert!(found.missed == 0 && found.rmse < 0.002, "{found}");
 }
 
 #[test]
 fn no_fireflies_of_a_tiny_emitter() {
-    // The same power from a millimetre and from two centimetres, in a room with bounces: all texels agree as far as both bakes state.
+    // The same power from a lamp of a millimetre and from one of two centimetres, in a room with bounces: all texels
+    // must agree within the stated errors of both bakes.
     let [mut tiny, mut small] = [1e-3f32, 2e-2].map(|side| {
         let mut world = World::new();
-        let mut room = shapes::cuboid(Vec3::new(3.0, 2.0, 2.0), 1);
-        room.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
-        room.normals.iter_mut().for_each(|normal| *normal = -*normal);
-        spawn(&mut world, room, grey(0.7, 0.0));
+        spawn(&mut world, room(Vec3::new(3.0, 2.0, 2.0)), grey(0.7, 0.0));
         spawn(&mut world, square(Vec3::new(0.4, 0.5, 0.1), side, false), grey(0.0, 1.0 / (side * side)));
         world
     });
@@ -91,14 +91,15 @@ fn no_fireflies_of_a_tiny_emitter() {
     let worst = tiny.iter().zip(&small).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / mean;
     println!("RMSE {rmse:.4}, worst {worst:.4}, stated {:.4} {:.4}", a.estimated_error, b.estimated_error);
     assert!(rmse < 2.0 * a.estimated_error.hypot(b.estimated_error), "{rmse}");
-    // Six standard deviations of the whole: no texel stands out.
+    // No texel deviates by more than twelve times the combined stated error.
     assert!(worst < 12.0 * a.estimated_error.hypot(b.estimated_error), "{worst}");
 }
 
 #[test]
 fn light_ratios_of_a_hundred_million() {
-    // Two lamps, one 10⁸ times as bright as the other, on two sides of a wall that hides each from the other's floor: beside the dim
-    // one the irradiance is its own, as Lambert has it; beside the bright one 10⁸ times that.
+    // Two lamps, one 10⁸ times as bright as the other, on two sides of a wall that hides each from the other's floor.
+    // Below the dim one the irradiance is that of Lambert's formula for it alone; below the bright one it is 10⁸ times
+    // as much.
     let floor = |x: f32| square(Vec3::new(x, 0.0, 0.0), 1.6, true);
     let mut world = World::new();
     for (x, radiance) in [(-1.0, 1.0f32), (1.0, 1e8)] {
@@ -119,8 +120,7 @@ fn light_ratios_of_a_hundred_million() {
 
 #[test]
 fn bright_and_dim_lights_side_by_side() {
-    // 20 point lights, each a tenth of the one before, under a plate that hides all but the dimmest and the sum of the others:
-    // more than have samples of their own.
+    // 20 point lights, each with 0.4 times the intensity of the one before: more than get samples of their own.
     let mut world = World::new();
     spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.0, 0.0));
     let strengths: Vec<f32> = (0..20).map(|i| 0.4f32.powi(i)).collect();
@@ -143,7 +143,7 @@ fn bright_and_dim_lights_side_by_side() {
 
 #[test]
 fn a_lamp_of_ten_thousand_triangles() {
-    // A sphere of one radiance sends E = π L (r/d)² cos θ wherever it is whole above the horizon.
+    // A sphere of uniform radiance gives E = π L (r/d)² cos θ wherever it is entirely above the horizon.
     let (radius, height, radiance) = (0.15f32, 1.0f32, 10.0f32);
     let mut world = World::new();
     spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.0, 0.0));
@@ -157,14 +157,15 @@ fn a_lamp_of_ten_thousand_triangles() {
     };
     let found = common::compare(&mut world, &points(0.0, value));
     println!("{found}; stated {:.3} %", 100.0 * report.estimated_error);
-    // The half per cent of far parts in one term, and of the polyhedron's silhouette 0.2 %.
+    // Half a per cent for distant parts of the lamp that are evaluated in one term, and 0.2 % for the polyhedron's
+    // silhouette.
     assert!(found.missed == 0 && found.rmse < 0.007, "{found}");
 }
 
 #[test]
 fn emission_that_varies_by_texture() {
-    // A picture of 24 x 24 texels, black and white in stripes and spots, a fifth of its width above the floor, against a sum over
-    // a fine grid with a bilinear look-up of its own.
+    // A texture of 24 x 24 texels with black and white stripes and spots, a fifth of its width above the floor, against
+    // a sum over a fine grid with an independent bilinear look-up.
     const N: usize = 24;
     let bright =
         |x: usize, y: usize| x.is_multiple_of(5) || (x * 7 + y * 3).is_multiple_of(11) || x > 17 && y > 11;
@@ -213,12 +214,13 @@ fn emission_that_varies_by_texture() {
     };
     let found = common::compare(&mut world, &points(0.0, value));
     println!("{found}; stated {:.3} %", 100.0 * report.estimated_error);
-    // Pieces of two texels of one radiance each, a fifth of the picture away, and far pieces in one term.
+    // The baker uses pieces of two texels with one radiance each, and evaluates distant pieces in one term.
     assert!(found.missed == 0 && found.rmse < 0.006, "{found}");
 }
 
-/// A lamp of a metre whose texture has so many texels a side, all black but one.
-fn one_texel(side: u32) -> (World, BakeReport) {
+/// Bakes a floor under a lamp of a metre whose texture has `side` texels a side, of which one is white and all others
+/// black.
+fn one_bright_texel(side: u32) -> (World, BakeReport) {
     let mut rgba = vec![0; 4 * (side * side) as usize];
     let (x, y) = (side / 3 + 1, side / 5 + 1);
     rgba[4 * (y * side + x) as usize..][..4].copy_from_slice(&[255; 4]);
@@ -233,7 +235,7 @@ fn one_texel(side: u32) -> (World, BakeReport) {
     let mut world = World::new();
     spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.0, 0.0));
     let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
-    // As bright as it is small.
+    // The radiance makes up for the texel's small area.
     let lamp = grey(0.0, (side * side) as f32);
     let mesh = Mesh(Arc::new(square(Vec3::Y, 1.0, false)));
     world.spawn((Name::new("screen"), mesh, lamp, textures, StaticObject));
@@ -244,7 +246,7 @@ fn one_texel(side: u32) -> (World, BakeReport) {
 #[test]
 fn a_bright_texel_is_not_missed_and_a_texture_that_is_read_more_coarsely_is_named() {
     for (side, named) in [(32, false), (512, true), (2048, true)] {
-        let (mut world, report) = one_texel(side);
+        let (mut world, report) = one_bright_texel(side);
         let words: Vec<_> =
             report.warnings.iter().filter(|warning| warning.starts_with("screen: ")).collect();
         assert_eq!(words.len(), usize::from(named), "{side}: {:?}", report.warnings);
@@ -252,7 +254,7 @@ fn a_bright_texel_is_not_missed_and_a_texture_that_is_read_more_coarsely_is_name
             words.iter().all(|words| words.contains("48 pieces") && !words.contains("missed")),
             "{words:?}"
         );
-        // One square metre of radiance 1, put together in one place.
+        // The texel has the power of one square metre of radiance 1, concentrated in one place.
         let (s, d) = (side as f64, f64::from(side / 5 + 1) + 0.5);
         let (u, v) = ((f64::from(side / 3 + 1) + 0.5) / s, d / s);
         let lamp = DVec3::new(u - 0.5, 1.0, v - 0.5);

@@ -1,4 +1,5 @@
-//! The error against time that a bake reports, and what it says that the error is made of. Not whether the error is honest.
+//! The curve of error against time that a bake reports, and the parts of the error that it names. Whether the stated
+//! error is true is tested in `honest_error`.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -14,16 +15,17 @@ fn baked(world: &mut World, error: f64) -> BakeReport {
     Bake::new(&options).run(world).unwrap()
 }
 
-/// The squares of the parts add up to that of the whole.
-fn is_the_sum_of_its_parts(report: &BakeReport) {
+/// Checks that the squares of the error's parts add up to the square of the estimated error.
+fn assert_parts_add_up(report: &BakeReport) {
     let sum: f64 = report.error_parts.iter().map(|part| part.error.powi(2)).sum();
-    let (found, expected) = (sum.sqrt(), report.estimated_error);
-    assert!((found - expected).abs() <= 1e-4 * expected, "{found} {expected}: {:?}", report.error_parts);
+    let (total, expected) = (sum.sqrt(), report.estimated_error);
+    assert!((total - expected).abs() <= 1e-4 * expected, "{total} {expected}: {:?}", report.error_parts);
     assert!(report.error_parts.is_sorted_by(|a, b| a.error >= b.error), "{:?}", report.error_parts);
     assert!(report.to_string().contains(&format!("made of {}", report.error_parts[0].what)), "{report}");
 }
 
-fn is_a_curve(report: &BakeReport) {
+/// Checks that the curve is ordered by time, ends at the reported error, and is printed and serialized.
+fn assert_is_curve(report: &BakeReport) {
     let curve = &report.curve;
     assert!(curve.iter().all(|point| point.seconds >= 0.0 && point.error.is_finite()), "{curve:?}");
     assert!(curve.is_sorted_by(|a, b| a.seconds <= b.seconds), "{curve:?}");
@@ -36,32 +38,32 @@ fn is_a_curve(report: &BakeReport) {
 }
 
 #[test]
-fn it_goes_forward_and_ends_at_what_is_reported() {
-    // Asked for much, there are several rounds; for little, one, and the end.
+fn the_curve_advances_and_ends_at_the_reported_error() {
+    // A small target error needs several rounds; a large one needs one round, after which the bake ends.
     let (fine, coarse) = (baked(&mut corner(), 0.003), baked(&mut corner(), 0.5));
-    is_a_curve(&fine);
-    is_a_curve(&coarse);
-    is_the_sum_of_its_parts(&fine);
-    is_the_sum_of_its_parts(&coarse);
+    assert_is_curve(&fine);
+    assert_is_curve(&coarse);
+    assert_parts_add_up(&fine);
+    assert_parts_add_up(&coarse);
     assert!(fine.error_parts.iter().any(|part| part.what == "noise of the final gather"), "{fine}");
     assert!(fine.curve.len() >= 3 && coarse.curve.len() == 2, "{:?} {:?}", fine.curve, coarse.curve);
     assert!(fine.curve[0].error > fine.estimated_error);
 }
 
 #[test]
-fn without_bounces_it_holds_direct_light() {
+fn without_bounces_the_curve_consists_of_direct_light() {
     let mut world = corner();
     let mut materials = world.query::<&mut Material>();
     materials.iter_mut(&mut world).for_each(|mut material| material.front.diffuse = Vec3::ZERO);
     let report = baked(&mut world, 0.01);
-    is_a_curve(&report);
+    assert_is_curve(&report);
     assert_eq!(report.curve.len(), 2);
-    is_the_sum_of_its_parts(&report);
+    assert_parts_add_up(&report);
     assert!(report.error_parts.iter().all(|part| !part.what.contains("gather")), "{report}");
 }
 
 #[test]
-fn without_light_it_is_empty() {
+fn without_light_the_curve_is_empty() {
     let mut world = corner();
     let mut materials = world.query::<&mut Material>();
     materials.iter_mut(&mut world).for_each(|mut material| material.front.emission = Vec3::ZERO);

@@ -1,4 +1,5 @@
-//! Input that breaks bakers: degenerate and duplicate triangles, reflectance above 1, sheets, mirror images, instances.
+//! Input that is difficult for bakers: degenerate and duplicate triangles, reflectance above 1, thin sheets, mirrored
+//! and instanced objects, alpha masks.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
@@ -23,15 +24,12 @@ fn spawn(world: &mut World, mesh: TriangleMesh, material: Material, place: Trans
     world.spawn((Mesh(Arc::new(mesh)), material, StaticObject, place)).id()
 }
 
-/// A square of side 2 at a height, looking up or down.
+/// A square of side 2 m at height `y`, looking up or down.
 fn square(y: f32, up: bool) -> TriangleMesh {
-    let positions =
-        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, z]| Vec3::new(x, y, z)).to_vec();
-    let indices = if up { vec![0, 2, 1, 0, 3, 2] } else { vec![0, 1, 2, 0, 2, 3] };
-    TriangleMesh { positions, indices, ..TriangleMesh::default() }
+    common::shapes::square(2.0, y, up)
 }
 
-/// Mean irradiance over texels that hold any, and whether all are finite.
+/// The mean irradiance over the texels that are not black. Checks that no texel is negative, infinite or NaN.
 fn mean(world: &World, entity: Entity) -> f32 {
     let map = &world.get::<Lightmap>(entity).expect("the entity was baked").image;
     assert!(map.texels.iter().all(|texel| texel.is_finite() && texel.min_element() >= 0.0));
@@ -50,15 +48,15 @@ fn degenerate_triangles_are_dropped_by_name() {
     world.entity_mut(floor).insert(Name::new("bad floor"));
     spawn(&mut world, square(1.0, false), grey(0.5, 1.0), Transform::IDENTITY);
     let report = run(&mut world);
-    for part in ["bad floor: 2 triangles with NaN", "bad floor: 2 triangles without area"] {
-        assert!(report.warnings.iter().any(|line| line.contains(part)), "{:?}", report.warnings);
+    for words in ["bad floor: 2 triangles with NaN", "bad floor: 2 triangles without area"] {
+        assert!(report.warnings.iter().any(|line| line.contains(words)), "{:?}", report.warnings);
     }
     let mut good = World::new();
     let reference = spawn(&mut good, square(0.0, true), grey(0.5, 0.0), Transform::IDENTITY);
     spawn(&mut good, square(1.0, false), grey(0.5, 1.0), Transform::IDENTITY);
     run(&mut good);
     assert!(mean(&world, floor) > 0.5 && mean(&good, reference) > 0.5);
-    // The same light at the same places, though the maps differ in their layout.
+    // The light at the same points must agree, though the layouts of the maps differ.
     let points: Vec<_> = (0..9)
         .map(|i| common::ReferencePoint {
             position: DVec3::new(f64::from(i % 3) * 0.6 - 0.6, 0.0, f64::from(i / 3) * 0.6 - 0.6),
@@ -72,7 +70,7 @@ fn degenerate_triangles_are_dropped_by_name() {
         .map(|&(position, irradiance, _)| common::ReferencePoint { position, normal: DVec3::Y, irradiance })
         .collect();
     let found = common::compare(&mut world, &lit);
-    // Two interpolations of the same smooth light at some ten texels a metre.
+    // Both maps interpolate the same smooth light, at some ten texels per metre.
     assert!(lit.len() == 9 && found.missed == 0 && found.rmse < 0.01, "{found}");
 }
 
@@ -102,14 +100,15 @@ fn a_lamp_in_the_plane_of_the_ceiling_shines() {
         mean(&world, floor)
     };
     let (alone, with_ceiling) = (floor_light(false), floor_light(true));
-    // F = 0.415253283577147 between the squares; the mean over texels counts the border's halves in full.
+    // F = 0.415253283577147 between the squares. The mean over texels gives border texels, which are half covered, full
+    // weight.
     assert!((alone / (PI * 0.415_253_3) - 1.0).abs() < 0.06, "{alone}");
     assert!((with_ceiling / alone - 1.0).abs() < 1e-4, "{with_ceiling} {alone}");
 }
 
 #[test]
 fn a_sheet_of_two_faces_keeps_its_sides_apart() {
-    // Lit from above only; the same corners twice, cut along the other diagonal. ρ = 0.
+    // A black sheet that is lit from above: two coincident faces that are split along different diagonals.
     let mut world = World::new();
     let top = spawn(&mut world, square(0.0, true), grey(0.0, 0.0), Transform::IDENTITY);
     let mut below = square(0.0, false);
@@ -125,7 +124,7 @@ fn a_sheet_of_two_faces_keeps_its_sides_apart() {
 }
 
 #[test]
-fn a_mirror_image_keeps_its_front() {
+fn a_mirrored_object_keeps_its_front() {
     let light = |scale: DVec3| {
         let mut world = World::new();
         let floor =
@@ -156,7 +155,7 @@ fn instances_share_coordinates_and_have_their_own_maps() {
 }
 
 #[test]
-fn what_a_mask_cuts_out_lets_light_through() {
+fn parts_that_an_alpha_mask_cuts_out_let_light_through() {
     let below = |alpha: f32| {
         let mut world = World::new();
         let floor = spawn(&mut world, square(0.0, true), grey(0.0, 0.0), Transform::IDENTITY);

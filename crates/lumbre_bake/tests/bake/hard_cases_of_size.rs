@@ -1,10 +1,12 @@
-//! Hard cases of size: scenes of a millimetre and of a hundred kilometres, lights a hundred million times apart, lamps far below a
-//! texel, charts below a texel, coordinates out of range. What each must give is a closed form.
+//! Cases of extreme size or brightness: scenes of a millimetre and of a hundred kilometres, lights whose intensities
+//! differ by a factor of 10⁸, lamps and charts far smaller than a texel, texture coordinates out of range. The expected
+//! values are closed forms.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::common;
+use crate::common::shapes::room;
 use crate::scene_parts::grey;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
@@ -23,19 +25,11 @@ fn run_with(world: &mut World, side: u32, quality: Quality) -> BakeReport {
     Bake::new(&options).run(world).expect("the scene bakes")
 }
 
-/// A box seen from inside.
-fn room(size: Vec3) -> TriangleMesh {
-    let mut mesh = shapes::cuboid(size, 1);
-    mesh.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
-    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-    mesh
-}
-
 fn spawn(world: &mut World, mesh: TriangleMesh, material: Material, at: DVec3) -> Entity {
     world.spawn((Mesh(Arc::new(mesh)), material, StaticObject, Transform::from_translation(at))).id()
 }
 
-/// Irradiance where there is any, in the red.
+/// The irradiance (red channel) of the texels that are not black.
 fn lit(world: &World, entity: Entity) -> Vec<f64> {
     let map = &world.get::<Lightmap>(entity).expect("the entity was baked").image;
     assert!(map.texels.iter().all(|texel| texel.is_finite()));
@@ -46,7 +40,8 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Irradiance, in the red, at a grid over the faces of a cube seen from inside: by face (-x, x, -y, y, -z, z).
+/// The irradiance (red channel) at a grid of points on each face of a cube seen from inside, in the order -x, x, -y, y,
+/// -z, z.
 fn on_the_walls(world: &mut World, half: f64) -> [Vec<f64>; 6] {
     const POINTS: i32 = 20;
     let surfaces = common::lightmapped(world);
@@ -67,18 +62,19 @@ fn on_the_walls(world: &mut World, half: f64) -> [Vec<f64>; 6] {
 
 #[test]
 fn no_ray_hits_the_face_it_left_from_a_millimetre_to_a_hundred_kilometres() {
-    // A closed room that shines all over: E = πL/(1 - ρ) everywhere. A ray that meets its own face loses light, one that leaves the room too.
+    // A closed room whose walls emit: E = πL/(1 - ρ) everywhere. A ray that hits the face it starts on loses light, and
+    // so does one that leaves the room.
     const REFLECTANCE: f32 = 0.7;
     let expected = PI / (1.0 - f64::from(REFLECTANCE));
     for size in [1e-3f32, 0.37, 1.0, 1e3, 1e5] {
-        // Far from the origin, too: there the corners themselves are rounded, to 2⁻²⁴ of where they are.
+        // Also far from the origin, where the rounding of the corners (2⁻²⁴ of their coordinates) is larger.
         for away in [0.0, 50.0] {
             let mut world = World::new();
             let at = DVec3::new(1.0, -0.3, 0.7) * (away * f64::from(size));
             let entity = spawn(&mut world, room(Vec3::new(1.0, 0.6, 0.8) * size), grey(REFLECTANCE, 1.0), at);
             let report = run(&mut world, 24);
             for e in lit(&world, entity) {
-                // Rows of the form factors sum to one within 2e-3 before they are multiplied by 1/(1 - ρ).
+                // The form factors of a row sum to one within 2e-3, an error that is multiplied by 1/(1 - ρ).
                 assert!(
                     (e / expected - 1.0).abs() < 0.01,
                     "{size} m, {away} away: {e} instead of {expected}"
@@ -91,7 +87,8 @@ fn no_ray_hits_the_face_it_left_from_a_millimetre_to_a_hundred_kilometres() {
 
 #[test]
 fn a_lamp_a_thousandth_of_the_room_gives_all_its_light_and_no_sparks() {
-    // Emitted and absorbed power are equal: the mean of E over the walls is Φ / (A (1 - ρ)), Φ = π L a².
+    // The emitted and the absorbed power are equal: the mean of E over the walls is Φ / (A (1 - ρ)), Φ = π L a for a
+    // lamp of area a.
     const REFLECTANCE: f32 = 0.5;
     for quality in [Quality::Draft, Quality::Final] {
         let mut world = World::new();
@@ -103,9 +100,10 @@ fn a_lamp_a_thousandth_of_the_room_gives_all_its_light_and_no_sparks() {
         let walls = on_the_walls(&mut world, 1.0);
         let all: Vec<f64> = walls.iter().flatten().copied().collect();
         let expected = PI * 1e6 * 6.0 * f64::from(side).powi(2) / (24.0 * 0.5);
-        // A grid of twenty points and texels of 1/10 m over a function like cos³/d²: well under one per cent; draft's patches another.
+        // The grid of 20 by 20 points and the texels contribute well under one per cent, and the patches of draft
+        // quality another one.
         assert!((mean(&all) / expected - 1.0).abs() < 0.02, "{} instead of {expected}", mean(&all));
-        // Beside its neighbours nothing stands out: along rows the change is that of the cosine and distance.
+        // No point stands out from its neighbours in a row.
         for wall in &walls {
             for row in wall.chunks(20) {
                 for three in row.windows(3) {
@@ -133,7 +131,8 @@ fn a_room_lit_a_hundred_million_times_less_than_its_neighbour_is_as_bright_as_al
         mean(&lit(&world, dim))
     };
     let (alone, beside) = (dim_room(false), dim_room(true));
-    // Power balance: mean E = Φ / Σ A (1 - ρ) with the lamp's own surface at ρ = 0.3, a little less on the room than on the lamp.
+    // By the balance of power, the mean of E is Φ / Σ A (1 - ρ), where the sum includes the lamp's surface with ρ =
+    // 0.3.
     assert!(alone > 0.15, "{alone}");
     assert!((beside / alone - 1.0).abs() < 0.02, "{beside} beside, {alone} alone");
 }
@@ -147,7 +146,7 @@ fn coordinates_out_of_range_and_overlapping_are_named_and_replaced() {
         ("not a number", |_| Vec2::NAN),
     ] {
         let mut world = World::new();
-        // All six faces have all of the unit square.
+        // Each of the six faces covers the whole unit square.
         let mut mesh = room(Vec3::ONE);
         mesh.uv1 = mesh.uv0.iter().map(|&uv| change(uv)).collect();
         let entity = spawn(&mut world, mesh, grey(0.5, 1.0), DVec3::ZERO);
@@ -155,7 +154,7 @@ fn coordinates_out_of_range_and_overlapping_are_named_and_replaced() {
         let report = run(&mut world, 32);
         let named = |line: &String| line.contains("papered room") && line.contains("unwrapped anew");
         assert!(report.warnings.iter().any(named), "{name}: {:?}", report.warnings);
-        // πL/(1 - ρ), in every texel: no face took another's place.
+        // E = πL/(1 - ρ) in every texel: no face overwrote another.
         for e in lit(&world, entity) {
             assert!((e / (2.0 * PI) - 1.0).abs() < 0.01, "{name}: {e}");
         }
@@ -164,7 +163,7 @@ fn coordinates_out_of_range_and_overlapping_are_named_and_replaced() {
 
 #[test]
 fn charts_below_a_texel_have_light() {
-    // A heap of triangles each far smaller than a texel, in the furnace: every one has πL/(1 - ρ), none is black.
+    // Boxes far smaller than a texel in a furnace: each of their triangles has E = πL/(1 - ρ), and none is black.
     let mut world = World::new();
     spawn(&mut world, room(Vec3::ONE), grey(0.5, 1.0), DVec3::ZERO);
     let mut crumbs = TriangleMesh::default();
@@ -177,7 +176,7 @@ fn charts_below_a_texel_have_light() {
         crumbs.indices.extend(tiny.indices.iter().map(|index| index + first));
     }
     let entity = spawn(&mut world, crumbs.clone(), grey(0.5, 1.0), DVec3::ZERO);
-    // A crumb's side is 1/156 of a texel.
+    // The side of a box is 1/156 of a texel.
     let options = BakeOptions {
         density: Density::TexelsPerMeter(32.0),
         quality: Quality::Draft,
@@ -189,7 +188,7 @@ fn charts_below_a_texel_have_light() {
         let normal = (b - a).cross(c - a).normalize();
         let point = common::ReferencePoint { position: (a + b + c) / 3.0, normal, irradiance: DVec3::ZERO };
         let found = common::look_up(&surfaces, &point).expect("the crumb has a map").x;
-        // The room is a little darkened by nothing: crumbs shine as the walls do.
+        // The boxes emit as the walls do, so that they do not darken the room.
         assert!((found / (2.0 * PI) - 1.0).abs() < 0.02, "{found} at {}", point.position);
     }
     assert!(!lit(&world, entity).is_empty());

@@ -1,4 +1,5 @@
-//! What counts as the baker's source: every crate whose change may change a baked bit changes the content hash.
+//! The hash of the baker's sources, which is part of the content hash: it covers every crate whose change may change a
+//! baked bit, and nothing else.
 
 #[path = "../../build/sources.rs"]
 mod sources;
@@ -8,10 +9,11 @@ use std::path::{Path, PathBuf};
 
 use sources::Sources;
 
-/// A workspace of two crates of ours, of which the second is below the first, and of some that come from elsewhere.
+/// A workspace on disk in which the baker depends on another project crate and that on an external one; further crates
+/// are unrelated to the baker. Returns its folder and the baker's.
 fn workspace() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("there is room for a few files");
-    let own = folder.path().join("crates/lumbre_bake");
+    let baker = folder.path().join("crates/lumbre_bake");
     for (path, text) in [
         ("crates/lumbre_bake/src/lib.rs", "mod deep;\n"),
         ("crates/lumbre_bake/src/deep/mod.rs", "// 1\n"),
@@ -24,7 +26,7 @@ fn workspace() -> (tempfile::TempDir, PathBuf) {
         fs::create_dir_all(path.parent().expect("it lies in a folder")).expect("a folder can be made");
         fs::write(path, text).expect("a file can be written");
     }
-    (folder, own)
+    (folder, baker)
 }
 
 const LOCK: &str = r#"version = 4
@@ -62,21 +64,21 @@ version = "0.30.0"
 checksum = "bbbb"
 "#;
 
-fn hash(own: &Path) -> u64 {
-    Sources::of(own).expect("the sources can be read").hash
+fn hash(baker: &Path) -> u64 {
+    Sources::of(baker).expect("the sources can be read").hash
 }
 
 #[test]
 fn what_may_change_a_bit_changes_the_hash_and_nothing_else_does() {
-    let (folder, own) = workspace();
-    let before = hash(&own);
-    assert_eq!(hash(&own), before);
+    let (folder, baker) = workspace();
+    let before = hash(&baker);
+    assert_eq!(hash(&baker), before);
     let with = |path: &str, from: &str, to: &str| {
         let path = folder.path().join(path);
         let text = fs::read_to_string(&path).expect("it was written");
         assert!(text.contains(from), "{text}");
         fs::write(&path, text.replace(from, to)).expect("a file can be written");
-        let changed = hash(&own);
+        let changed = hash(&baker);
         fs::write(&path, text).expect("a file can be written");
         changed
     };
@@ -96,22 +98,22 @@ fn what_may_change_a_bit_changes_the_hash_and_nothing_else_does() {
     ] {
         assert_eq!(with(path, from, to), before, "{path}: {from} became {to}");
     }
-    assert_eq!(hash(&own), before);
+    assert_eq!(hash(&baker), before);
 }
 
 #[test]
-fn a_package_of_its_own_has_a_hash_of_its_own() {
-    let (folder, own) = workspace();
+fn a_package_outside_the_workspace_is_hashed_by_its_manifest() {
+    let (folder, baker) = workspace();
     fs::remove_file(folder.path().join("Cargo.lock")).expect("it was there");
     fs::remove_dir_all(folder.path().join("crates/lumbre_rays")).expect("it was there");
-    let before = hash(&own);
-    fs::write(own.join("Cargo.toml"), "[package]\n[dependencies]\nlumbre_rays = \"0.2\"\n")
+    let before = hash(&baker);
+    fs::write(baker.join("Cargo.toml"), "[package]\n[dependencies]\nlumbre_rays = \"0.2\"\n")
         .expect("it can be");
-    assert_ne!(hash(&own), before);
+    assert_ne!(hash(&baker), before);
 }
 
 #[test]
-fn all_of_ours_below_the_baker_count() {
+fn all_project_crates_that_the_baker_depends_on_are_hashed() {
     let sources = Sources::of(Path::new(env!("CARGO_MANIFEST_DIR"))).expect("the sources can be read");
     let counts = |name: &str| sources.watched.iter().any(|path| path.ends_with(format!("{name}/src")));
     for name in ["lumbre_bake", "lumbre_mesh", "lumbre_optics", "lumbre_rays", "lumbre_scene"] {

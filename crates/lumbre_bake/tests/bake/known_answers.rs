@@ -1,4 +1,5 @@
-//! Whole bakes of scenes whose irradiance is known in closed form, and the checks that need none: threads, scale, channels.
+//! Whole bakes of scenes whose irradiance is known in closed form, and properties that need no expected value: the same
+//! result on any number of threads and at any scale, symmetry of the channels, linearity.
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -17,19 +18,11 @@ fn draft(side: u32) -> BakeOptions {
     BakeOptions { density: Density::MapSize(side), quality: Quality::Draft, ..BakeOptions::default() }
 }
 
-/// A box seen from inside.
-fn room(size: Vec3) -> Arc<TriangleMesh> {
-    let mut mesh = shapes::cuboid(size, 1);
-    for triangle in mesh.indices.chunks_exact_mut(3) {
-        triangle.swap(1, 2);
-    }
-    for normal in &mut mesh.normals {
-        *normal = -*normal;
-    }
-    Arc::new(mesh)
+fn room(size: Vec3) -> Mesh {
+    Mesh(Arc::new(common::shapes::room(size)))
 }
 
-/// Covered texels of all maps, as irradiance.
+/// The irradiance of all texels of all maps.
 fn irradiances(world: &mut World) -> Vec<DVec3> {
     let maps = common::maps(world);
     maps.iter().flat_map(|(_, map)| map.texels.iter().map(|texel| texel.as_dvec3() * PI)).collect()
@@ -37,11 +30,11 @@ fn irradiances(world: &mut World) -> Vec<DVec3> {
 
 #[test]
 fn furnace() {
-    // Closed, uniform emission L and reflectance ρ: every surface receives E = πL / (1 - ρ).
+    // A closed room of uniform emission L and reflectance ρ: every surface receives E = πL / (1 - ρ).
     for reflectance in [0.2f32, 0.8] {
         let mut world = World::new();
         let material = matt(Vec3::splat(reflectance), Vec3::new(1.0, 0.5, 0.25));
-        let entity = world.spawn((Mesh(room(Vec3::new(2.0, 1.0, 1.5))), material, StaticObject)).id();
+        let entity = world.spawn((room(Vec3::new(2.0, 1.0, 1.5)), material, StaticObject)).id();
         let report = run(&mut world, &draft(48));
         assert!(report.energy_lost < 0.01 && report.warnings.is_empty(), "{report:?}");
         let lightmap = world.get::<Lightmap>(entity).unwrap();
@@ -50,7 +43,8 @@ fn furnace() {
             lightmap.image.texels.iter().map(|t| f64::from(t.x) * PI).filter(|&e| e > 0.0).collect();
         assert!(lit.len() > 500);
         let mean = lit.iter().sum::<f64>() / lit.len() as f64;
-        // Direct light is exact; the rest is a mean of equal values: what is left is the row sums' error.
+        // Direct light is exact, and indirect light is a mean of equal values: what remains is the error of the row
+        // sums.
         assert!((mean / expected - 1.0).abs() < 5e-3, "{reflectance}: {mean} {expected}");
         let worst = lit.iter().map(|e| (e / expected - 1.0).abs()).fold(0.0, f64::max);
         assert!(worst < 0.03, "{reflectance}: {worst}");
@@ -61,8 +55,9 @@ fn furnace() {
 
 #[test]
 fn two_squares() {
-    // ρ = 0.8, the lower one's own exitance 1: with E = B - own over ρ. oracles.md gives the constant-patch solution;
-    // over the squares the mean irradiance of the upper one differs from it by the second bounce's unevenness only.
+    // Two parallel unit squares of ρ = 0.8, of which the lower one emits an exitance of 1; E = (B - emitted exitance) /
+    // ρ. The expected value is the solution with one constant patch per square (oracles.md); the mean irradiance of the
+    // upper square differs from it only in that the second bounce is not uniform over the squares.
     let square = |y: f32, up: bool| {
         let mut mesh = TriangleMesh {
             positions: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
@@ -85,7 +80,8 @@ fn two_squares() {
     let options = BakeOptions { quality: Quality::Final, ..draft(32) };
     run(&mut world, &options);
     let map = world.get::<Lightmap>(upper).unwrap().image.clone();
-    // The chart's border lies on the centres of its outermost texels: they count half, corners a quarter.
+    // The chart's border passes through the centres of its outermost texels: these have half weight, the corners a
+    // quarter.
     let (mut sum, mut weights) = (0.0, 0.0);
     let covered =
         |x: i64, y: i64| x >= 0 && y >= 0 && x < 32 && y < 32 && map.texels[(y * 32 + x) as usize].x > 0.0;
@@ -107,7 +103,7 @@ fn two_squares() {
 
 #[test]
 fn a_point_light_over_a_floor() {
-    // E = π L_d cos θ / d², nothing bounces.
+    // E = π L_d cos θ / d²; there are no bounces.
     let mut world = World::new();
     let floor = Mesh(Arc::new(TriangleMesh {
         positions: [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]]
@@ -135,11 +131,12 @@ fn a_point_light_over_a_floor() {
         .collect();
     let found = common::compare(&mut world, &points);
     assert_eq!(found.missed, 0);
-    // Bilinear interpolation of a smooth function at 1/16 m: h²/8 |E''| is some tenths of a per cent.
+    // The error of bilinear interpolation between texels of h = 1/16 m, h²/8 |E''|, is some tenths of a per cent.
     assert!(found.rmse < 0.005, "{found}");
 }
 
-/// A room with a lamp and a crate that stands on the floor.
+/// A room with a lamp and a crate that stands on the floor. The colors are the walls' reflectance and the lamp's
+/// radiance.
 fn furnished(scale: f32, colors: [Vec3; 2]) -> World {
     let mut world = World::new();
     let place = |x: f32, y: f32, z: f32| {
@@ -147,7 +144,7 @@ fn furnished(scale: f32, colors: [Vec3; 2]) -> World {
     };
     world.spawn((
         Name::new("room"),
-        Mesh(room(Vec3::new(4.0, 2.0, 3.0) * scale)),
+        room(Vec3::new(4.0, 2.0, 3.0) * scale),
         matt(colors[0], Vec3::ZERO),
         StaticObject,
     ));
@@ -205,7 +202,7 @@ fn swapping_channels_swaps_the_result() {
     assert_eq!(a.rays, b.rays);
     let (plain, swapped) = (irradiances(&mut plain), irradiances(&mut swapped));
     for (p, s) in plain.iter().zip(&swapped) {
-        // The emitters' powers are summed in another order, and channels are solved to a residual of 1e-5.
+        // The emitters' powers are summed in another order, and the channels are solved to a residual of 1e-5.
         assert!((DVec3::new(p.z, p.x, p.y) - *s).abs().max_element() <= 2e-3 * s.max_element(), "{p} {s}");
     }
 }
@@ -226,7 +223,7 @@ fn no_texel_under_the_crate_darkens_its_rim() {
     let report = run(&mut world, &draft(64));
     assert!(report.hidden_texels > 0, "{report:?}");
     assert!(irradiances(&mut world).iter().all(|e| e.is_finite() && e.min_element() >= 0.0));
-    // Beside the crate's lit side, just off its rim, towards the lamp.
+    // Points of the floor just beside the side of the crate that faces the lamp.
     let maps = common::maps(&mut world);
     assert_eq!(maps.len(), 3);
     let points: Vec<_> = [0.01, 0.03, 0.05]
@@ -246,14 +243,14 @@ fn no_texel_under_the_crate_darkens_its_rim() {
 }
 
 #[test]
-fn only_what_is_called_for() {
+fn stages_without_effect_are_skipped() {
     let mut empty = World::new();
     assert!(run(&mut empty, &draft(16)).skipped[0].contains("no static mesh"));
     let mut dark = furnished(1.0, [COLORS[0], Vec3::ZERO]);
     let report = run(&mut dark, &draft(16));
     assert!(report.skipped[0].contains("no surface emits") && report.rays == 0, "{report:?}");
     let mut black = World::new();
-    black.spawn((Mesh(room(Vec3::ONE)), matt(Vec3::ZERO, Vec3::ONE), StaticObject));
+    black.spawn((room(Vec3::ONE), matt(Vec3::ZERO, Vec3::ONE), StaticObject));
     let report = run(&mut black, &draft(16));
     assert!(report.skipped.iter().any(|line| line.contains("rho = 0")), "{report:?}");
     assert!(report.stages.iter().all(|stage| stage.stage != "final gather"));

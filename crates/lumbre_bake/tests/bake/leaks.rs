@@ -1,9 +1,10 @@
-//! Light does not leak: two rooms with a thin wall between them and no opening, a lamp in one of them.
+//! Light must not leak: mostly scenes of two closed rooms with a thin wall between them and a lamp in one of them.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::common;
+use crate::common::shapes::inside_out;
 use crate::scene_parts::grey;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
@@ -13,10 +14,10 @@ use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
 
-/// Side of a texel, metres.
+/// The side of a texel in metres.
 const TEXEL: f64 = 0.05;
 
-/// Turned, so that no wall lies on numbers that are exact.
+/// The transform of all objects. It is rotated, so that the coordinates of walls are rounded.
 fn place() -> Transform {
     let rotation = DQuat::from_axis_angle(DVec3::new(0.3, 0.9, -0.2).normalize(), 0.7);
     Transform { rotation, ..Transform::from_xyz(3.1, -1.7, 5.3) }
@@ -26,10 +27,11 @@ fn spawn(world: &mut World, mesh: TriangleMesh, material: Material) -> Entity {
     world.spawn((Mesh(Arc::new(mesh)), material, StaticObject, place())).id()
 }
 
-/// A box between two corners; its sides look inward or outward. Those whose middle `keep` refuses are left out.
+/// A box between two corners whose sides look inward or outward. `keep` decides by the outward normal of a side whether
+/// it is part of the mesh.
 fn sides(low: Vec3, high: Vec3, inward: bool, keep: impl Fn(Vec3) -> bool) -> TriangleMesh {
     let mut mesh = shapes::cuboid(high - low, 1);
-    // Corners of neighbours are the same number.
+    // Boxes that share a corner must have exactly the same coordinates there.
     mesh.positions.iter_mut().for_each(|p| *p = Vec3::select(p.cmpgt(Vec3::ZERO), high, low));
     let mut indices = Vec::new();
     for side in mesh.indices.chunks_exact(6) {
@@ -40,22 +42,19 @@ fn sides(low: Vec3, high: Vec3, inward: bool, keep: impl Fn(Vec3) -> bool) -> Tr
         }
     }
     mesh.indices = indices;
-    if inward {
-        mesh.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
-        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-    }
-    mesh
+    if inward { inside_out(mesh) } else { mesh }
 }
 
+/// The corners of the lit room.
 const LOW: Vec3 = Vec3::new(-2.0, 0.0, -1.0);
 const HIGH: Vec3 = Vec3::new(0.0, 1.5, 1.0);
 
-/// The other room's corners, the wall being so thick.
-fn beyond(thickness: f32) -> (Vec3, Vec3) {
+/// The corners of the dark room behind a wall of this thickness.
+fn dark_room(thickness: f32) -> (Vec3, Vec3) {
     (Vec3::new(thickness, LOW.y, LOW.z), Vec3::new(thickness + 1.5, HIGH.y, HIGH.z))
 }
 
-/// A lamp under the ceiling near the wall, and a point light low beside it.
+/// Adds a lamp under the ceiling near the wall, and a point light low beside the wall.
 fn add_light(world: &mut World, reflectance: f32) {
     let lamp = sides(Vec3::new(-0.6, 1.3, -0.3), Vec3::new(-0.2, 1.35, 0.3), false, |_| true);
     spawn(world, lamp, grey(reflectance, 8.0));
@@ -75,16 +74,17 @@ fn run_with(world: &mut World, quality: Quality) -> BakeReport {
     Bake::new(&options).run(world).expect("the scene bakes")
 }
 
-/// A point of a surface as the scene was modelled, the irradiance there by bilinear look-up, and the largest error stated
-/// by the texels that it reads.
-struct Found {
+/// A point of a surface in object space, its irradiance by bilinear look-up, and the largest stated error of the four
+/// texels that are read.
+struct Sample {
     position: DVec3,
     irradiance: f64,
     stated: f64,
 }
 
-/// Random points of an entity's surface, edges and corners among them; the same for the same triangles.
-fn look_up(world: &World, entity: Entity) -> Vec<Found> {
+/// Looks up random points of an entity's surface, including edges and corners. The points are the same for the same
+/// mesh.
+fn look_up(world: &World, entity: Entity) -> Vec<Sample> {
     let mesh = &world.get::<Mesh>(entity).expect("it was baked").0;
     let map = &world.get::<Lightmap>(entity).expect("it was baked").image;
     let errors = &world.get::<TexelErrors>(entity).expect("it was baked").0;
@@ -103,7 +103,7 @@ fn look_up(world: &World, entity: Entity) -> Vec<Found> {
             1 => v = 0.0,
             2 => v = 1.0 - u,
             3 => (u, v) = (u.round(), 0.0),
-            // Within a hundredth of an edge.
+            // Within a hundredth of the triangle's size from an edge.
             4 => u *= 0.01,
             5 => v *= 0.01,
             _ => {}
@@ -120,10 +120,10 @@ fn look_up(world: &World, entity: Entity) -> Vec<Found> {
         for step in [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE] {
             let texel = (low + step).max(DVec2::ZERO);
             let (x, y) = ((texel.x as u32).min(map.width - 1), (texel.y as u32).min(map.height - 1));
-            // NaN, of a texel without a surface, is never the larger one.
+            // `max` ignores the NaN of a texel without a surface.
             stated = stated.max(f64::from(errors[(y * map.width + x) as usize]) * PI);
         }
-        found.push(Found { position, irradiance: common::bilinear(map, uv).max_element() * PI, stated });
+        found.push(Sample { position, irradiance: common::bilinear(map, uv).max_element() * PI, stated });
     }
     found
 }
@@ -132,8 +132,8 @@ fn brightest(world: &World, entity: Entity) -> f64 {
     look_up(world, entity).iter().map(|found| found.irradiance).fold(0.0, f64::max)
 }
 
-/// The share of points of a room that are within two stated errors of the same room baked alone, and the root of the mean squared
-/// difference over that of the stated errors.
+/// Compares a room with the same room baked alone. Returns the share of points that differ by at most twice the stated
+/// errors, and the RMS difference over the RMS of the stated errors.
 fn compare_with_alone(world: &World, room: Entity, alone: &World, same: Entity) -> (f64, f64) {
     let (mut within, mut count, mut squares, mut expected) = (0u32, 0u32, 0.0, 0.0);
     for (a, b) in look_up(world, room).iter().zip(look_up(alone, same)) {
@@ -147,7 +147,7 @@ fn compare_with_alone(world: &World, room: Entity, alone: &World, same: Entity) 
     (f64::from(within) / f64::from(count), (squares / expected).sqrt())
 }
 
-/// The lit room by itself: `walls` says which sides it has of its own.
+/// Bakes the lit room alone. `keep` decides which sides the room itself has; `wall` is an additional object.
 fn alone(keep: impl Fn(Vec3) -> bool, wall: Option<(TriangleMesh, Material)>) -> (World, Entity) {
     let mut world = World::new();
     let room = spawn(&mut world, sides(LOW, HIGH, true, keep), grey(0.6, 0.0));
@@ -164,7 +164,7 @@ fn two_closed_boxes_share_a_wall() {
     for thickness in [0.0, 0.01] {
         let mut world = World::new();
         let room = spawn(&mut world, sides(LOW, HIGH, true, |_| true), grey(0.6, 0.0));
-        let (low, high) = beyond(thickness);
+        let (low, high) = dark_room(thickness);
         let dark = spawn(&mut world, sides(low, high, true, |_| true), grey(0.6, 0.0));
         add_light(&mut world, 0.5);
         let report = run(&mut world);
@@ -178,7 +178,7 @@ fn two_closed_boxes_share_a_wall() {
     }
 }
 
-/// All sides but the one towards the other room; normals as a box seen from outside has them.
+/// Keeps all sides except the one towards the other room; normals are those of a box seen from outside.
 fn but_towards(x: f32) -> impl Fn(Vec3) -> bool {
     move |normal: Vec3| normal.x * x < 0.5
 }
@@ -187,9 +187,9 @@ fn but_towards(x: f32) -> impl Fn(Vec3) -> bool {
 fn a_wall_of_zero_thickness_and_two_sides() {
     let mut world = World::new();
     let room = spawn(&mut world, sides(LOW, HIGH, true, but_towards(1.0)), grey(0.6, 0.0));
-    let (low, high) = beyond(0.0);
+    let (low, high) = dark_room(0.0);
     let dark = spawn(&mut world, sides(low, high, true, but_towards(-1.0)), grey(0.6, 0.0));
-    // Its front looks into the dark room: a map shows fronts.
+    // The wall's front, whose irradiance its map shows, looks into the dark room.
     let wall = || {
         let mesh = sides(LOW, HIGH, false, |normal| normal.x > 0.5);
         (mesh, Material { double_sided: true, ..grey(0.6, 0.0) })
@@ -212,7 +212,7 @@ fn a_wall_a_centimetre_thick_between_texels_of_five() {
     let thickness = 0.01;
     let mut world = World::new();
     let room = spawn(&mut world, sides(LOW, HIGH, true, but_towards(1.0)), grey(0.6, 0.0));
-    let (low, high) = beyond(thickness);
+    let (low, high) = dark_room(thickness);
     let dark = spawn(&mut world, sides(low, high, true, but_towards(-1.0)), grey(0.6, 0.0));
     let wall = || sides(Vec3::new(0.0, LOW.y, LOW.z), Vec3::new(thickness, HIGH.y, HIGH.z), false, |_| true);
     let wall_between = spawn(&mut world, wall(), grey(0.6, 0.0));
@@ -220,9 +220,9 @@ fn a_wall_a_centimetre_thick_between_texels_of_five() {
     run(&mut world);
     assert!(brightest(&world, room) > 1.0);
     assert_eq!(brightest(&world, dark), 0.0);
-    // Of the wall, the side that looks into the dark.
+    // The side of the wall that looks into the dark room.
     let towards_dark =
-        |found: &&Found| found.position.x > 0.9 * f64::from(thickness) && inside(&found.position);
+        |found: &&Sample| found.position.x > 0.9 * f64::from(thickness) && inside(&found.position);
     let found = look_up(&world, wall_between);
     assert!(found.iter().filter(towards_dark).count() > 1000);
     assert!(found.iter().filter(towards_dark).all(|found| found.irradiance == 0.0));
@@ -232,20 +232,21 @@ fn a_wall_a_centimetre_thick_between_texels_of_five() {
     assert!(share >= 0.95 && ratio <= 1.0, "{share} {ratio}");
 }
 
-/// Off the wall's narrow sides, which share their edges with the big ones.
+/// Whether a point lies off the wall's narrow sides, which share edges with the large ones.
 fn inside(p: &DVec3) -> bool {
     p.y > 1e-6 && p.y < 1.5 - 1e-6 && p.z.abs() < 1.0 - 1e-6
 }
 
-/// Irradiance on a floor that runs through under the wall, by distance from it on the dark side: the largest within each step, in
-/// texels, over the mean on the lit side. And the largest of the dark walls.
+/// Bakes two rooms whose common floor continues under the wall. Returns the largest irradiance of the floor on the dark
+/// side for each interval of distance from the wall (in texels), and the largest irradiance of the dark walls; both are
+/// relative to the mean of the floor on the lit side.
 fn under_a_wall(thickness: f32, reflectance: f32, steps: &[f64]) -> (Vec<f64>, f64) {
     let mut world = World::new();
     let no_floor = |normal: Vec3| normal.y > -0.5;
     let lit = move |normal: Vec3| no_floor(normal) && normal.x < 0.5;
     let other = move |normal: Vec3| no_floor(normal) && normal.x > -0.5;
     spawn(&mut world, sides(LOW, HIGH, true, lit), grey(reflectance, 0.0));
-    let (low, high) = beyond(thickness);
+    let (low, high) = dark_room(thickness);
     let dark = spawn(&mut world, sides(low, high, true, other), grey(reflectance, 0.0));
     let below = Vec3::new(high.x, LOW.y + 1.0, high.z);
     let floor = spawn(&mut world, sides(LOW, below, true, |normal| normal.y < -0.5), grey(reflectance, 0.0));
@@ -276,22 +277,23 @@ fn a_floor_that_runs_through_under_the_wall_leaks_a_texel_at_most() {
     for thickness in [0.0, 0.01] {
         let (direct, walls) = under_a_wall(thickness, 0.0, &steps);
         println!("{thickness}, direct: {direct:.4?}; walls {walls:.4}");
-        // A texel that straddles the wall ends at most a texel beyond it, and filtering reads it half a texel on; on the border of
-        // the chart its neighbour takes from it too.
+        // A texel that the wall crosses ends at most a texel beyond it, and filtering reads it from half a texel
+        // further on; on the border of the chart, its neighbour is extrapolated from it.
         assert!(direct[5..].iter().all(|&leak| leak == 0.0) && walls == 0.0, "{direct:?} {walls}");
         let (all, walls) = under_a_wall(thickness, 0.6, &steps);
         println!("{thickness}, with bounces: {all:.4?}; walls {walls:.4}");
-        // Patches are cut along the wall, and a texel that straddles it hands nothing on: what is left is the value that such a texel
-        // shows, read by filtering, and by the texels beside it where they are smoothed together.
+        // Patches are split along the wall, and a texel that the wall crosses passes no light on to others. What
+        // remains is the value of such a texel, which filtering and denoising spread to its neighbours.
         assert!(all[5..].iter().all(|&leak| leak < 0.002) && all[7] < 1e-4, "{all:?} {walls}");
-        // Only in the corner itself, in the texel where wall and floor meet.
+        // Walls receive light only in the corner, in the texel where wall and floor meet.
         assert!(walls < 0.04, "{walls}");
     }
 }
 
-/// A block that stands on another, which stands on the floor: between them it is dark, whatever lies on the far side of what they stand on.
+/// A block stands on another one, which stands on the floor: the faces by which they touch are dark, whatever lies
+/// behind the surface that they stand on.
 #[test]
-fn what_stands_on_what_stands_on_the_floor() {
+fn stacked_blocks_are_dark_between_each_other() {
     let mut world = World::new();
     spawn(&mut world, sides(LOW, HIGH, true, |_| true), grey(0.6, 0.0));
     let lower = (Vec3::new(-1.6, 0.0, -0.5), Vec3::new(-0.9, 0.3, 0.4));
@@ -303,7 +305,7 @@ fn what_stands_on_what_stands_on_the_floor() {
     for ((entity, low, high), heights) in [(lower, vec![0.0]), (upper, vec![0.3, f64::from(HIGH.y)])] {
         let (mut dark, mut lit) = (0, 0);
         for found in look_up(&world, entity) {
-            // Off the rim by a texel: there, bilinear filtering reads the open side of an edge that is nobody's.
+            // Points near the rim are excluded: there, bilinear filtering may read texels of the open side.
             let [x, _, z] = found.position.to_array();
             let rim = 1.5 * TEXEL;
             let within = (f64::from(low.x) + rim..=f64::from(high.x) - rim).contains(&x)
@@ -324,27 +326,28 @@ fn what_stands_on_what_stands_on_the_floor() {
         }
         assert!(dark > 500 && lit > 5000, "{dark} {lit}");
     }
-    // Few points at rims are misjudged: of 16 rays of each texel these tell of less than one texel in a thousand.
+    // Few points at rims may be misclassified: of 16 rays for each texel, fewer than one in a thousand may leak.
     let covered = report.coverage * report.texels as f64 * 16.0;
     assert!((report.leaked_rays as f64) < 1e-3 * covered, "{} of {covered}", report.leaked_rays);
 }
 
-/// A room, and the house around it in the very same places: what is inside of the house is no inside of a solid, and the sun shines on it.
+/// A room and the house around it with coincident walls: the inside of the house is not the inside of a solid, and the
+/// sun shines on its outside.
 #[test]
 fn a_house_of_zero_thickness_is_lit_on_both_sides() {
     let mut world = World::new();
     let room = spawn(&mut world, sides(LOW, HIGH, true, |_| true), grey(0.6, 0.0));
     let house = spawn(&mut world, sides(LOW, HIGH, false, |_| true), grey(0.6, 0.0));
     add_light(&mut world, 0.5);
-    let alone = run(&mut world);
-    assert!(brightest(&world, room) > 1.0 && alone.leaked_rays < 1000, "{}", alone.leaked_rays);
+    let report = run(&mut world);
+    assert!(brightest(&world, room) > 1.0 && report.leaked_rays < 1000, "{}", report.leaked_rays);
     assert_eq!(brightest(&world, house), 0.0);
     let (place, from) = (place(), place().rotation * DVec3::new(3.0, 5.0, 2.0));
     let at = place.translation + from;
     let sun = Light { bake: BakeMode::Static, ..Light::directional(Vec3::ONE) };
     world.spawn((sun, Transform::from_xyz(at.x, at.y, at.z).looking_at(place.translation, DVec3::Y)));
     run(&mut world);
-    // The roof, off its rim: π n·l.
+    // The roof without its rim has E = π n·l.
     let expected = PI * 5.0 / 38f64.sqrt();
     let is_roof = |at: DVec3| {
         let rim = 2.0 * TEXEL;

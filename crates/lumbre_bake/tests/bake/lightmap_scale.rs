@@ -1,4 +1,4 @@
-//! Density per object: what is looked at closely gets more texels.
+//! The lightmap scale of an object, which multiplies its density of texels.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use lumbre_bake::{
 };
 use lumbre_mesh::{TriangleMesh, shapes};
 
-/// Two equal floors beside each other under a sky, the second with this scale.
+/// Bakes two equal floors beside each other under a sky, the second one with this lightmap scale.
 fn bake(density: Density, scale: f64) -> BakedScene {
     let mesh = Arc::new(shapes::plane(2.0, 2.0, 1, 1));
     let floor = |name: &str, x: f64, lightmap_scale: f64| {
@@ -22,7 +22,7 @@ fn bake(density: Density, scale: f64) -> BakedScene {
     Bake::new(&options).run_scene(scene).expect("the scene bakes")
 }
 
-/// Texels along one metre of an object, by the area of its coordinates.
+/// The texels per metre of an object, by the area of its lightmap coordinates.
 fn density(baked: &BakedScene, object: usize) -> f64 {
     let map = &baked.maps[baked.objects[object].map].image;
     let mesh: &TriangleMesh = &baked.objects[object].meshes[0];
@@ -37,16 +37,16 @@ fn density(baked: &BakedScene, object: usize) -> f64 {
 }
 
 #[test]
-fn an_object_has_its_share_of_the_density() {
+fn the_scale_multiplies_the_density() {
     for scale in [0.5, 1.0, 2.0, 3.0] {
         let baked = bake(Density::TexelsPerMeter(16.0), scale);
         let (plain, scaled) = (density(&baked, 0), density(&baked, 1));
-        // A chart has whole texels each way.
+        // The size of a chart is rounded to whole texels.
         assert!((plain / 16.0 - 1.0).abs() < 0.1, "{plain}");
         assert!((scaled / (16.0 * scale) - 1.0).abs() < 0.1, "{scaled} at a scale of {scale}");
         let sky = std::f32::consts::PI;
         for map in &baked.maps {
-            // Under an open sky E = π L everywhere, whatever the density.
+            // Under an open sky E = π L everywhere, at any density.
             let lit = map.image.texels.iter().zip(map.errors.0.iter()).filter(|(_, error)| error.is_finite());
             assert!(lit.clone().count() > 40);
             lit.for_each(|(texel, _)| {
@@ -57,7 +57,7 @@ fn an_object_has_its_share_of_the_density() {
 }
 
 #[test]
-fn the_automatic_density_keeps_its_texels() {
+fn the_automatic_density_keeps_the_total_of_texels() {
     let (plain, scaled) = (bake(Density::Automatic, 1.0), bake(Density::Automatic, 3.0));
     let (before, after) = (plain.report.texels as f64, scaled.report.texels as f64);
     assert!((after / before - 1.0).abs() < 0.1, "{before} and {after}");

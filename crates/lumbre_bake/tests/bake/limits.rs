@@ -1,4 +1,4 @@
-//! What a bake may take: time and memory. Not how long anything takes on this machine.
+//! Limits of a bake: time, memory, and the size of maps.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -28,7 +28,7 @@ fn baked(
     (world, report)
 }
 
-/// Light and stated error of every texel that shows a surface, mean of the channels.
+/// The mean of the channels and the stated error of every texel that shows a surface.
 fn texels(world: &mut World) -> Vec<(f32, f32)> {
     let mut maps = world.query::<(&Lightmap, &TexelErrors)>();
     let mut found: Vec<_> = maps.iter(world).collect();
@@ -37,19 +37,19 @@ fn texels(world: &mut World) -> Vec<(f32, f32)> {
     texels.filter(|(_, error)| !error.is_nan()).map(|(e, error)| (e.element_sum() / 3.0, *error)).collect()
 }
 
-/// A map for which the time ran out is complete, and honest about what it is worth.
-fn complete_and_honest(world: &mut World, report: &BakeReport, what: &str) {
+/// Checks that the maps of a bake whose time ran out are complete, and that the stated error covers the true one.
+fn assert_complete_and_honest(world: &mut World, report: &BakeReport, what: &str) {
     assert_eq!((report.ended, report.error_reached), (Ended::Time, false), "{what}");
     let (mut better, _) = baked(&options(), &mut |_| ControlFlow::Continue(()));
     let (found, expected) = (texels(world), texels(&mut better));
     assert_eq!(found.len(), expected.len(), "{what}");
     let mean = expected.iter().map(|(e, _)| f64::from(*e)).sum::<f64>() / expected.len() as f64;
-    // Outer faces see a sliver of the floor, which the few rays of a patch may all miss.
+    // Outer faces see only a sliver of the floor, which all of the few rays of a patch may miss.
     let lit = |e: f32| f64::from(e) > 0.05 * mean;
     let dark =
         found.iter().zip(&expected).filter(|(found, expected)| found.0 <= 0.0 && lit(expected.0)).count();
     assert_eq!(dark, 0, "{what}: texels without light that have some");
-    // The better bake's own error is far below: 1 % of the mean.
+    // The error of the better bake, 1 % of the mean, is far smaller.
     let square = |(a, b): (&(f32, f32), &(f32, f32))| f64::from(a.0 - b.0).powi(2);
     let error = (found.iter().zip(&expected).map(square).sum::<f64>() / found.len() as f64).sqrt() / mean;
     assert!(error <= 2.0 * report.estimated_error, "{what}: {error} of {}", report.estimated_error);
@@ -60,7 +60,7 @@ fn complete_and_honest(world: &mut World, report: &BakeReport, what: &str) {
 fn without_any_time_there_is_a_complete_map() {
     let options = BakeOptions { time: Some(Duration::from_nanos(1)), ..options() };
     let (mut world, report) = baked(&options, &mut |_| ControlFlow::Continue(()));
-    complete_and_honest(&mut world, &report, "no time");
+    assert_complete_and_honest(&mut world, &report, "no time");
 }
 
 #[test]
@@ -68,21 +68,22 @@ fn wherever_the_time_runs_out_the_map_is_complete() {
     let time = Duration::from_millis(400);
     for stage in ["direct light", "form factors", "radiosity", "final gather"] {
         let begun = Instant::now();
-        // Makes the time run out there, on a machine of any speed.
-        let mut waiting = |progress: Progress| {
+        // Makes the time run out in this stage on a machine of any speed.
+        let mut wait = |progress: Progress| {
             if progress.stage == stage && progress.stage_fraction > 0.0 {
                 std::thread::sleep(time.saturating_sub(begun.elapsed()));
             }
             ControlFlow::Continue(())
         };
-        let (mut world, report) = baked(&BakeOptions { time: Some(time), ..options() }, &mut waiting);
-        complete_and_honest(&mut world, &report, stage);
+        let (mut world, report) = baked(&BakeOptions { time: Some(time), ..options() }, &mut wait);
+        assert_complete_and_honest(&mut world, &report, stage);
     }
 }
 
-/// A box that is sunk into a floor hides a quarter of it: many more texels than are looked at closely whatever the time.
+/// A box that is sunk into a floor hides a quarter of it: many more texels than can be tested exactly when there is no
+/// time.
 #[test]
-fn what_a_large_map_hides_is_told_without_any_time() {
+fn hidden_texels_of_a_large_map_are_found_without_any_time() {
     let shown = |time| {
         let mut world = World::new();
         let mut add = |size: Vec3, height: f64, name: &str| {
@@ -104,17 +105,17 @@ fn what_a_large_map_hides_is_told_without_any_time() {
         let report = Bake::new(&options).run(&mut world).unwrap();
         (texels(&mut world).len(), report)
     };
-    let (closely, report) = shown(None);
+    let (exact, report) = shown(None);
     assert!(report.hidden_texels > 9_000, "{}", report.hidden_texels);
-    let (roughly, report) = shown(Some(Duration::from_nanos(1)));
+    let (rough, report) = shown(Some(Duration::from_nanos(1)));
     assert_eq!(report.ended, Ended::Time);
-    // What may differ is the box's outline on the floor.
-    let apart = closely.abs_diff(roughly);
-    assert!(apart < 800, "{closely} texels show something, or {roughly}");
+    // Only texels at the box's outline on the floor may differ.
+    let difference = exact.abs_diff(rough);
+    assert!(difference < 800, "{exact} texels show something, or {rough}");
 }
 
 #[test]
-fn the_end_is_named() {
+fn the_report_states_why_the_bake_ended() {
     let end = |options: BakeOptions| baked(&options, &mut |_| ControlFlow::Continue(())).1;
     let reached = end(BakeOptions { error: 0.1, time: Some(Duration::from_secs(3600)), ..options() });
     assert_eq!((reached.ended, reached.error_reached), (Ended::Reached, true));
@@ -127,7 +128,7 @@ fn the_end_is_named() {
 }
 
 #[test]
-fn less_memory_means_fewer_patches_and_none_an_error_that_says_what_to_do() {
+fn less_memory_means_fewer_patches_and_too_little_is_an_error() {
     let within = |memory| {
         let mut world = corner();
         Bake::new(&BakeOptions { memory, ..options() }).run(&mut world)
@@ -136,7 +137,7 @@ fn less_memory_means_fewer_patches_and_none_an_error_that_says_what_to_do() {
     let enough = within(Some(free.memory_bytes)).unwrap();
     assert_eq!((enough.patches, enough.memory_bytes), (free.patches, free.memory_bytes));
     assert!(enough.warnings.is_empty());
-    // Half of what is beyond the texels and what is fixed.
+    // The smallest possible amount; then the middle between that and what the bake takes without a limit.
     let least = match within(Some(1 << 20)) {
         Err(error @ BakeError::Memory { needed, texels, limit, .. }) => {
             assert!(limit == 1 << 20 && needed > texels && texels > 0);
@@ -159,12 +160,12 @@ fn less_memory_means_fewer_patches_and_none_an_error_that_says_what_to_do() {
         "{:?}",
         tight.warnings
     );
-    // As many patches as there are: no limit is no loss of light, only of detail.
+    // Fewer patches lose detail, but no light.
     let apart = (tight.mean_irradiance[1] / free.mean_irradiance[1] - 1.0).abs();
     assert!(apart < 3.0 * (tight.estimated_error + free.estimated_error), "{apart}");
 }
 
-/// So many triangles that have nothing to do with each other: as many charts.
+/// A mesh of `count` separate triangles, which need as many charts.
 fn confetti(count: u32) -> lumbre_mesh::TriangleMesh {
     let corners = (0..count).flat_map(|index| {
         let at = Vec3::new((index % 100) as f32, (index / 100) as f32, 0.0) * 0.1;
@@ -177,19 +178,20 @@ fn confetti(count: u32) -> lumbre_mesh::TriangleMesh {
     }
 }
 
+/// Bakes a mesh under a point light. Returns the report and the side of the mesh's map.
 fn baked_alone(
     mesh: lumbre_mesh::TriangleMesh,
     options: &BakeOptions,
 ) -> (Result<BakeReport, BakeError>, Option<u32>) {
     let mut world = World::new();
-    let own =
+    let entity =
         world.spawn((Name::new("confetti"), Mesh(Arc::new(mesh)), Material::default(), StaticObject)).id();
     world.spawn((
         Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) },
         Transform::from_xyz(5.0, 1.0, 9.0),
     ));
     let report = Bake::new(options).run(&mut world);
-    (report, world.get::<Lightmap>(own).map(|map| map.image.width))
+    (report, world.get::<Lightmap>(entity).map(|map| map.image.width))
 }
 
 #[test]
@@ -204,13 +206,13 @@ fn charts_that_do_not_fit_a_map_get_a_larger_one_and_a_warning() {
         ["confetti", "500 charts", "16 x 16", "128 x 128"].iter().all(|word| warning.contains(word))
     };
     assert_eq!(warnings.iter().filter(warned).count(), 1, "{warnings:?}");
-    // Those that fit have the size that was asked for, and no warning.
+    // Charts that fit get a map of the requested size, without a warning.
     let (report, side) = baked_alone(confetti(12), &options);
     assert_eq!((side, report.unwrap().warnings), (Some(16), Vec::new()));
 }
 
 #[test]
-fn charts_that_no_map_holds_are_an_error_that_says_what_to_do() {
+fn charts_that_fit_no_map_are_an_error_with_advice() {
     // With a gap of 64 the largest map holds 15,625 charts.
     for density in [Density::MapSize(64), Density::TexelsPerMeter(1.0)] {
         let options = BakeOptions { density, gap: 64, ..options() };
@@ -231,7 +233,7 @@ fn the_scanned_bunny_fits_a_larger_map() {
     let mut world = World::new();
     lumbre_scene::load(&mut world, &model).unwrap();
     let options = BakeOptions { density: Density::MapSize(64), ..options() };
-    // Without a light in the file, only the layout is made.
+    // The file has no light, so that only the layout is computed.
     let report = Bake::new(&options).run(&mut world).unwrap();
     assert!(
         report.warnings.iter().any(|warning| warning.contains("do not fit a map of 64 x 64")),

@@ -1,6 +1,7 @@
-//! The baker as a whole, a subject a module. One program for all of them: each would carry the baker's generic code anew.
+//! Tests of the baker as a whole, with a module for each subject. They are one program, since each program compiles the
+//! baker's generic code again.
 //!
-//! What measures the whole process, its memory or its answer to a signal, is a program of its own beside this one.
+//! Tests that measure the process or depend on its timing (`peak_memory`, `cancelled`) are programs of their own.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,4 +1,5 @@
-//! What must not change a bake, or by no more than its stated error: threads, scale, rotation, triangles, things that light never meets.
+//! Changes that must leave a bake as it is, or change it by no more than its stated error: the number of threads,
+//! scale, rotation, finer triangles, objects that no light reaches.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -7,11 +8,12 @@ use bevy_ecs::world::World;
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use lumbre_bake::{BakeOptions, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{Material, Surface};
+use lumbre_optics::Material;
 use lumbre_scene::{Mesh, StaticObject, Transform};
 
+use crate::common::shapes::inside_out;
 use crate::held_out::scenes;
-use crate::scene_parts::run;
+use crate::scene_parts::{matt, run};
 use crate::{common, held_out};
 
 fn draft() -> BakeOptions {
@@ -34,30 +36,26 @@ fn rooms_and_hall_have_the_same_bits_at_every_scale_of_two_and_on_1_2_and_8_thre
     }
 }
 
-fn matt(reflectance: [f32; 3], emission: f32) -> Material {
-    let front =
-        Surface { diffuse: Vec3::from(reflectance), emission: Vec3::splat(emission), ..Surface::default() };
-    Material { front, ..Material::default() }
+fn painted(reflectance: [f32; 3], emission: f32) -> Material {
+    matt(Vec3::from(reflectance), Vec3::splat(emission))
 }
 
-/// A room with a lamp and a crate, turned, its walls in `divisions`² quads.
+/// A rotated room with a lamp and a crate; each of its walls consists of `divisions`² quads.
 fn furnished(turn: DQuat, divisions: u32) -> World {
     let mut world = World::new();
     let mut place = |mesh: TriangleMesh, material: Material, at: DVec3| {
         let transform = Transform::from_translation(turn * at).with_rotation(turn);
         world.spawn((Mesh(Arc::new(mesh)), material, StaticObject, transform));
     };
-    let mut walls = shapes::cuboid(Vec3::new(4.0, 2.5, 3.0), divisions);
-    walls.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
-    walls.normals.iter_mut().for_each(|normal| *normal = -*normal);
-    place(walls, matt([0.7, 0.5, 0.3], 0.0), DVec3::ZERO);
-    place(shapes::cuboid(Vec3::splat(0.75), 1), matt([0.5; 3], 0.0), DVec3::new(0.5, -0.875, 0.25));
-    place(shapes::cuboid(Vec3::new(0.6, 0.1, 0.6), 1), matt([0.25; 3], 8.0), DVec3::new(-0.5, 0.9, 0.0));
+    let walls = inside_out(shapes::cuboid(Vec3::new(4.0, 2.5, 3.0), divisions));
+    place(walls, painted([0.7, 0.5, 0.3], 0.0), DVec3::ZERO);
+    place(shapes::cuboid(Vec3::splat(0.75), 1), painted([0.5; 3], 0.0), DVec3::new(0.5, -0.875, 0.25));
+    place(shapes::cuboid(Vec3::new(0.6, 0.1, 0.6), 1), painted([0.25; 3], 8.0), DVec3::new(-0.5, 0.9, 0.0));
     world
 }
 
-/// Irradiance at points of walls, floor, ceiling and crate, in the room's own frame; not within a texel of an edge, where the charts of
-/// two layouts lie differently.
+/// The irradiance at points of walls, floor, ceiling and crate that are the same in the room's own frame. They keep
+/// away from edges, where the charts of two layouts differ.
 fn probe(world: &mut World, turn: DQuat) -> Vec<DVec3> {
     let surfaces = common::lightmapped(world);
     let mut random = held_out::random::Random::new(3);
@@ -74,7 +72,7 @@ fn probe(world: &mut World, turn: DQuat) -> Vec<DVec3> {
             let mut normal = DVec3::ZERO;
             normal[axis] = side * out;
             let position = center + local * half;
-            // Not what the crate hides.
+            // Skip points below or near the crate.
             let under =
                 position.y < -1.2 && (position - DVec3::new(0.5, -1.25, 0.25)).abs().max_element() < 0.45;
             if under {
@@ -91,8 +89,8 @@ fn probe(world: &mut World, turn: DQuat) -> Vec<DVec3> {
     found
 }
 
-/// RMSE of two lists relative to the first one's mean.
-fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
+/// The RMS difference of two lists relative to the mean of the first one.
+fn relative_difference(a: &[DVec3], b: &[DVec3]) -> f64 {
     let mean = a.iter().map(|v| v.element_sum()).sum::<f64>() / (3 * a.len()) as f64;
     let squares: f64 = a.iter().zip(b).map(|(a, b)| (*a - *b).length_squared()).sum();
     (squares / (3 * a.len()) as f64).sqrt() / mean
@@ -109,45 +107,48 @@ fn rotation_and_finer_triangles_stay_within_the_stated_error() {
     };
     let odd = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7);
     let (plain, stated) = baked(DQuat::IDENTITY, 1, 16.0);
-    // What the map's resolution leaves: another lattice of texels on the same surfaces.
+    // For information, the effect of the map's resolution: the same scene with another lattice of texels.
     let (shifted, _) = baked(DQuat::IDENTITY, 1, 14.3);
-    let lattice = apart(&plain, &shifted);
+    let lattice = relative_difference(&plain, &shifted);
     for (name, turn, divisions) in [
         ("by a quarter", DQuat::from_rotation_y(PI / 2.0), 1),
         ("by an odd angle", odd, 1),
         ("finer triangles", DQuat::IDENTITY, 5),
     ] {
-        let (found, also) = baked(turn, divisions, 16.0);
-        let difference = apart(&plain, &found);
+        let (found, other_stated) = baked(turn, divisions, 16.0);
+        let difference = relative_difference(&plain, &found);
         println!(
             "{name}: apart {:.3} %, stated {:.3} and {:.3} %, lattices {:.3} %",
             100.0 * difference,
             100.0 * stated,
-            100.0 * also,
+            100.0 * other_stated,
             100.0 * lattice
         );
-        // Two independent errors, each within its statement: twice their root of squares is as much as honesty allows.
-        assert!(difference < 2.0 * stated.hypot(also), "{name}: {difference}, stated {stated} and {also}");
+        // The two errors are independent, so that the stated errors add up by their squares; the limit is twice that.
+        assert!(
+            difference < 2.0 * stated.hypot(other_stated),
+            "{name}: {difference}, stated {stated} and {other_stated}"
+        );
         assert!(difference > 0.0);
     }
 }
 
 #[test]
-fn what_light_never_meets_changes_no_more_than_the_samples() {
+fn objects_that_no_light_reaches_change_only_the_samples() {
     let options =
         BakeOptions { density: Density::TexelsPerMeter(12.0), error: 0.02, ..BakeOptions::default() };
     let baked = |outside: bool, hidden: bool| {
         let mut world = furnished(DQuat::IDENTITY, 1);
         if outside {
-            // In the dark, behind a wall; within the scene's power of two, so that its frame stays.
+            // In the dark behind a wall, yet near enough that the scene's scale, a power of two, stays the same.
             let rock = Mesh(Arc::new(shapes::cuboid(Vec3::splat(0.3), 1)));
-            world.spawn((rock, matt([0.5; 3], 0.0), StaticObject, Transform::from_xyz(2.6, 0.0, 0.0)));
+            world.spawn((rock, painted([0.5; 3], 0.0), StaticObject, Transform::from_xyz(2.6, 0.0, 0.0)));
         }
         if hidden {
             let ghost = Mesh(Arc::new(shapes::cuboid(Vec3::splat(0.9), 1)));
             world.spawn((
                 ghost,
-                matt([0.5; 3], 5.0),
+                painted([0.5; 3], 5.0),
                 StaticObject,
                 lumbre_scene::Hidden,
                 Transform::from_affine(DAffine3::IDENTITY).0,
@@ -159,7 +160,10 @@ fn what_light_never_meets_changes_no_more_than_the_samples() {
     let (bits, plain, stated) = baked(false, false);
     let (with_ghost, ..) = baked(false, true);
     assert!(bits == with_ghost, "a hidden object has no part in the bake");
-    let (_, with_rock, also) = baked(true, false);
-    let difference = apart(&plain, &with_rock);
-    assert!(difference < 2.0 * stated.hypot(also), "{difference}, stated {stated} and {also}");
+    let (_, with_rock, other_stated) = baked(true, false);
+    let difference = relative_difference(&plain, &with_rock);
+    assert!(
+        difference < 2.0 * stated.hypot(other_stated),
+        "{difference}, stated {stated} and {other_stated}"
+    );
 }

@@ -1,4 +1,4 @@
-//! The tests' own path tracer against closed forms and against another's measured irradiance.
+//! The tests' own path tracer against closed forms and against the converged irradiance of another path tracer.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -25,17 +25,17 @@ fn agrees_with_another_path_tracer() {
         let mut world = World::new();
         lumbre_scene::load(&mut world, &model).expect("the model loads");
         let expected: Vec<_> = read(&points).into_iter().take(60).collect();
-        // The file rounds positions to six digits: off the surface by more than that.
+        // The file rounds positions to six digits: move the points off the surface by more than that.
         let places: Vec<(DVec3, DVec3)> = expected
             .iter()
             .map(|p| (p.position + p.normal * (1e-5 * p.position.length()), p.normal))
             .collect();
         let found = PathTracer::new(&mut world).at(&places, Effort::fixed(8, 24), 5);
         let (mut difference, mut variance, mut sum) = (0.0, 0.0, 0.0);
-        for (own, other) in found.iter().zip(&expected) {
+        for (traced, other) in found.iter().zip(&expected) {
             for channel in (0..3).filter(|&c| other.value[c].is_finite()) {
-                difference += own.value[channel] - other.value[channel];
-                variance += own.error[channel].powi(2) + other.error[channel].powi(2);
+                difference += traced.value[channel] - other.value[channel];
+                variance += traced.error[channel].powi(2) + other.error[channel].powi(2);
                 sum += other.value[channel];
             }
         }
@@ -45,7 +45,8 @@ fn agrees_with_another_path_tracer() {
             100.0 * difference / sum,
             100.0 * variance.sqrt() / sum
         );
-        // Channels of one path go together, so that three times the variance of independent ones bounds it: five sigma.
+        // The channels of a path are correlated; three times the variance of independent channels is an upper bound.
+        // The limit is five sigma.
         assert!(difference.abs() < 5.0 * (3.0 * variance).sqrt(), "{}: {difference}", model.display());
     }
 }
@@ -59,20 +60,20 @@ fn on_the_floor() -> Vec<(DVec3, DVec3)> {
     (0..25).map(|i| (DVec3::new(f64::from(i % 5) - 2.1, 0.0, f64::from(i / 5) - 2.2), DVec3::Y)).collect()
 }
 
-/// Root mean square of what the points are off by, in their own standard errors.
+/// The root mean square of the points' errors in units of their standard errors.
 fn sigmas(found: &[held_out::path_tracer::Irradiance], expected: impl Fn(DVec3) -> f64) -> f64 {
     let square = |p: &held_out::path_tracer::Irradiance| {
-        let wanted = expected(p.position);
-        // Exact ones are off by roundings.
-        ((p.value.x - wanted) / p.error.x.max(1e-6 * wanted)).powi(2)
+        let expected = expected(p.position);
+        // Points without noise still differ by rounding.
+        ((p.value.x - expected) / p.error.x.max(1e-6 * expected)).powi(2)
     };
     (found.iter().map(square).sum::<f64>() / found.len() as f64).sqrt()
 }
 
 #[test]
 fn sun_and_sky() {
-    // A black wall that ends at the floor before it hides of the sky what two perpendicular rectangles have, and of the sun what lies in its
-    // shadow: it comes over the wall's top, 1 m high, at 45°.
+    // A black wall, 1 m high, stands on the floor. It hides a part of the sky that is known from the form factor of two
+    // perpendicular rectangles, and casts a sharp shadow of the sun, which shines over its top at 45°.
     let mut world = World::new();
     floor(&mut world);
     let corners = [[0.0, 0.0, 50.0], [0.0, 0.0, -50.0], [0.0, 1.0, -50.0], [0.0, 1.0, 50.0]];
@@ -90,7 +91,7 @@ fn sun_and_sky() {
         [0.2, 0.9, 1.1, 2.5].map(|x| (DVec3::new(x, 0.0, 0.1), DVec3::Y)).into_iter().collect();
     let found = PathTracer::new(&mut world).at(&places, Effort::fixed(16, 24), 3);
     let expected = |p: DVec3| {
-        // The wall has no end: it hides (1 - sin β)/2 of the floor's half with tan β = x/1 m.
+        // The wall is practically infinite: it hides (1 - sin β)/2 of the sky, with tan β = x/1 m.
         let hidden = 0.5 * (1.0 - p.x / p.x.hypot(1.0));
         let sun = if p.x > 1.0 { PI * 3.0 / 2f64.sqrt() } else { 0.0 };
         2.0 * PI * (1.0 - hidden) + sun
@@ -104,9 +105,9 @@ fn sun_and_sky() {
             expected(p.position)
         );
     }
-    let off = sigmas(&found, expected);
-    assert!(off < 2.5, "{off}");
-    // The edge of the sun's shadow lies between the second and the third, but not within a texel of either.
+    let deviation = sigmas(&found, expected);
+    assert!(deviation < 2.5, "{deviation}");
+    // The edge of the sun's shadow lies between the second and the third point, but not within a texel of either.
     assert!(found.iter().all(|p| !p.edge && p.inside));
     let near =
         PathTracer::new(&mut world).at(&[(DVec3::new(0.99, 0.0, 0.1), DVec3::Y)], Effort::fixed(2, 4), 3);
@@ -115,8 +116,8 @@ fn sun_and_sky() {
 
 #[test]
 fn many_lamps_as_their_sum() {
-    // Squares of 4 mm, 1.5 to 2.5 m above a black floor: each as a point to 10⁻⁵, and of what is behind them they hide less than 10⁻³; and as
-    // many point lights.
+    // Emissive squares of 4 mm, 1.5 to 2.5 m above a black floor: each acts as a point to within 10⁻⁵, and together
+    // they hide less than 10⁻³ of each other. Then as many point lights.
     let places: Vec<DVec3> = (0..1500u32)
         .map(|i| {
             let [x, y, z] = [0.755, 0.57, 0.438].map(|step| (0.5 + step * f64::from(i)).fract());
@@ -164,8 +165,8 @@ fn many_lamps_as_their_sum() {
 #[test]
 #[ignore = "slow: scripts/test --all runs it"]
 fn guided_paths_and_light_gathered_before_change_nothing_but_noise() {
-    // The room with the sun in it: by bare paths, by paths that are led through its window and to the sun on the floor, and by those that end
-    // at their first bounce.
+    // The sunlit room by plain paths, by paths that are guided to its window and to the sun on its floor, and by paths
+    // that end in the indirect cache at their first bounce.
     let places: Vec<_> = [
         ([2.5, 2.7, 2.0], DVec3::NEG_Y),
         ([5.0, 1.8, 1.0], DVec3::NEG_X),
@@ -177,7 +178,7 @@ fn guided_paths_and_light_gathered_before_change_nothing_but_noise() {
     let mut world = scenes::sunlit_room(0, 1.0);
     let guided = PathTracer::new(&mut world);
     let found = guided.at(&places, Effort::fixed(48, 24), 3);
-    let short = guided.with_bounced(1).at(&places, Effort::fixed(48, 24), 3);
+    let short = guided.with_indirect_cache(1).at(&places, Effort::fixed(48, 24), 3);
     world.remove_resource::<Region>();
     let bare = PathTracer::new(&mut world).at(&places, Effort::fixed(96, 24), 4);
     for ((a, b), c) in found.iter().zip(&short).zip(&bare) {
@@ -185,7 +186,7 @@ fn guided_paths_and_light_gathered_before_change_nothing_but_noise() {
         println!("guided {}, gathered before {}, bare {}", show(a), show(b), show(c));
         for (one, other, allowed) in [(a, c, 0.0), (b, c, 0.01)] {
             let sigma = one.error.x.hypot(other.error.x) + allowed * other.value.x;
-            // Light that is even over a quarter of a metre: a hundredth more.
+            // The cached light is constant over a quarter of a metre, for which 1 % is allowed.
             assert!((one.value.x - other.value.x).abs() < 4.0 * sigma, "{}", one.position);
         }
     }
@@ -193,14 +194,17 @@ fn guided_paths_and_light_gathered_before_change_nothing_but_noise() {
 
 #[test]
 #[ignore = "slow: scripts/test --all runs it"]
-fn light_between_a_lamp_and_the_ceiling_that_it_lies_against_is_seen_by_nobody() {
+fn light_in_the_gap_between_a_lamp_and_the_ceiling_does_not_leak_out() {
     let (build, layout) = scenes::find("cellar_0").expect("a level of the tests");
     let mut world = build(layout, 1.0);
     let place = [(DVec3::new(-1.242, 0.0, 2.731), DVec3::Y)];
-    let plain = PathTracer::new(&mut world).at(&place, Effort::fixed(36, 24), 5)[0];
-    let short = PathTracer::new(&mut world).with_bounced(7).at(&place, Effort::fixed(36, 24), 5)[0];
-    let apart = (plain.value - short.value).abs();
-    let allowed = 4.0 * (plain.error + short.error);
-    // With that light it was 16 % more.
-    assert!(apart.cmple(allowed).all() && apart.max_element() < 0.05 * plain.value.max_element(), "{apart}");
+    let full_paths = PathTracer::new(&mut world).at(&place, Effort::fixed(36, 24), 5)[0];
+    let cached = PathTracer::new(&mut world).with_indirect_cache(7).at(&place, Effort::fixed(36, 24), 5)[0];
+    let difference = (full_paths.value - cached.value).abs();
+    let allowed = 4.0 * (full_paths.error + cached.error);
+    // Light that leaked from the gap once made the cached result 16 % brighter.
+    assert!(
+        difference.cmple(allowed).all() && difference.max_element() < 0.05 * full_paths.value.max_element(),
+        "{difference}"
+    );
 }

@@ -1,4 +1,4 @@
-//! Plain data in and out: a scene without a World bakes to the same bits as the World it was taken from.
+//! Bakes from and to plain data: a scene without a World bakes to the same bits as the World with the same content.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use lumbre_bake::{
     TexelErrors,
 };
 use lumbre_mesh::shapes;
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{
     DynamicObject, IrradianceVolume, Lightmap, Mesh, Name, SceneSettings, StaticObject, Transform,
 };
@@ -19,12 +19,11 @@ fn options() -> BakeOptions {
     BakeOptions { density: Density::TexelsPerMeter(6.0), quality: Quality::Draft, ..BakeOptions::default() }
 }
 
-fn matt(reflectance: Vec3) -> Material {
-    let front = Surface { diffuse: reflectance, ..Surface::default() };
-    Material { front, ..Material::default() }
+fn reflecting(reflectance: Vec3) -> Material {
+    crate::scene_parts::matt(reflectance, Vec3::ZERO)
 }
 
-/// A floor and two turned boxes of one mesh under a lamp and a sky, and something that moves between them.
+/// A floor and two rotated boxes that share a mesh under a point light and a sky, and a dynamic ball between them.
 struct Scene {
     floor: Arc<lumbre_mesh::TriangleMesh>,
     block: Arc<lumbre_mesh::TriangleMesh>,
@@ -57,14 +56,14 @@ impl Scene {
     fn world(&self) -> World {
         let mut world = World::new();
         world.insert_resource(SceneSettings { sky: SKY, ..SceneSettings::default() });
-        world.spawn((Name::new("floor"), Mesh(Arc::clone(&self.floor)), matt(FLOOR), StaticObject));
+        world.spawn((Name::new("floor"), Mesh(Arc::clone(&self.floor)), reflecting(FLOOR), StaticObject));
         for (index, place) in Self::places().into_iter().enumerate() {
             let name = Name::new(format!("block {index}"));
-            world.spawn((name, Mesh(Arc::clone(&self.block)), matt(BLOCK), StaticObject, place));
+            world.spawn((name, Mesh(Arc::clone(&self.block)), reflecting(BLOCK), StaticObject, place));
         }
         world.spawn((
             Mesh(Arc::clone(&self.ball)),
-            matt(BLOCK),
+            reflecting(BLOCK),
             DynamicObject,
             Transform::from_xyz(0.0, 1.0, 0.0),
         ));
@@ -79,10 +78,10 @@ impl Scene {
             transform,
             ..PlacedPrimitive::default()
         };
-        let floor = primitive(&self.floor, matt(FLOOR), DAffine3::IDENTITY);
+        let floor = primitive(&self.floor, reflecting(FLOOR), DAffine3::IDENTITY);
         let mut objects = vec![SceneObject::new("floor", vec![floor])];
         for (index, place) in Self::places().into_iter().enumerate() {
-            let block = primitive(&self.block, matt(BLOCK), place.affine());
+            let block = primitive(&self.block, reflecting(BLOCK), place.affine());
             objects.push(SceneObject::new(format!("block {index}"), vec![block]));
         }
         let moving = self.ball.positions.iter().map(|point| point.as_dvec3() + DVec3::Y).collect();
@@ -102,7 +101,7 @@ fn a_scene_without_a_world_bakes_to_the_same_bits() {
     let options = BakeOptions { atlas_size: Some(256), ..options() };
     let of_world = Bake::new(&options).run(&mut world).unwrap();
     let mut plain = scene.plain();
-    // A World's objects are baked in the order of their entities, whatever that is.
+    // The objects of a World are baked in the order of their entities, so that the plain scene needs the same order.
     let mut named: Vec<(Entity, Name)> =
         world.query::<(Entity, &Name)>().iter(&world).map(|(entity, name)| (entity, name.clone())).collect();
     named.sort_by_key(|(entity, _)| *entity);
@@ -114,19 +113,19 @@ fn a_scene_without_a_world_bakes_to_the_same_bits() {
     assert_eq!((baked.report.rays, baked.report.estimated_error), (of_world.rays, of_world.estimated_error));
     assert!(baked.samples.is_none(), "nobody asked for them");
     let mut query = world.query::<(&Name, &Mesh, &Lightmap, &TexelErrors)>();
-    let mut seen = 0;
+    let mut count = 0;
     for (name, mesh, map, errors) in query.iter(&world) {
-        let index = names.iter().position(|own| own == name.as_str()).unwrap();
+        let index = names.iter().position(|other| other == name.as_str()).unwrap();
         let object = &baked.objects[index];
-        let own = &baked.maps[object.map];
+        let baked_map = &baked.maps[object.map];
         assert_eq!(*object.meshes[0], *mesh.0, "{name}");
-        assert_eq!(own.image, map.image, "{name}");
-        assert!(own.separate.is_none(), "nobody asked for it");
+        assert_eq!(baked_map.image, map.image, "{name}");
+        assert!(baked_map.separate.is_none(), "nobody asked for it");
         let bits = |errors: &TexelErrors| errors.0.iter().map(|error| error.to_bits()).collect::<Vec<_>>();
-        assert_eq!(bits(&own.errors), bits(errors), "{name}");
-        seen += 1;
+        assert_eq!(bits(&baked_map.errors), bits(errors), "{name}");
+        count += 1;
     }
-    assert_eq!(seen, baked.objects.len());
+    assert_eq!(count, baked.objects.len());
     let (place, volume) = baked.volume.unwrap();
     let mut query = world.query::<(&Transform, &IrradianceVolume)>();
     let (of_world, expected) = query.single(&world).unwrap();
@@ -134,7 +133,7 @@ fn a_scene_without_a_world_bakes_to_the_same_bits() {
 }
 
 #[test]
-fn samples_are_kept_without_a_world_too() {
+fn samples_can_be_reused_without_a_world() {
     let scene = Scene::new();
     let first = Bake::new(&options()).keep_samples().run_scene(scene.plain()).unwrap();
     let samples = first.samples.unwrap();
@@ -147,7 +146,7 @@ fn samples_are_kept_without_a_world_too() {
 }
 
 #[test]
-fn what_cannot_be_baked_is_refused_by_name() {
+fn invalid_objects_are_refused_by_name() {
     let refused = |change: &dyn Fn(&mut StaticScene)| {
         let mut scene = Scene::new().plain();
         change(&mut scene);
@@ -168,11 +167,11 @@ fn what_cannot_be_baked_is_refused_by_name() {
 }
 
 #[test]
-fn nothing_to_bake_is_said_and_no_error() {
+fn a_scene_with_nothing_to_bake_is_reported_and_no_error() {
     let empty = Bake::new(&options()).run_scene(StaticScene::default()).unwrap();
     assert!(empty.objects.is_empty() && empty.maps.is_empty() && empty.volume.is_none());
     assert_eq!(empty.report.skipped, ["everything: the scene has no static mesh"]);
-    // A sky of numbers that are no light, and a lamp that is off, are none.
+    // An invalid sky and a disabled light count as no light.
     let mut dark = Scene::new().plain();
     dark.sky = Vec3::new(f32::NAN, 1.0, 1.0);
     dark.lights[0].light.enabled = false;

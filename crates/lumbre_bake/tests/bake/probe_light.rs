@@ -1,7 +1,8 @@
-//! What a ball takes of the probes wherever it is carried, against the tests' own path tracer: two rooms joined by a doorway, one of them lit, with a wall between them
-//! that is thinner than a cell.
+//! The light that a small ball receives from the probes at random places, against the tests' own path tracer. The scene
+//! has two rooms joined by a doorway, one of them lit, with a wall between them that is thinner than a cell of the
+//! grid.
 
-#![allow(clippy::print_stdout, reason = "the figures are what one wants to see of it")]
+#![allow(clippy::print_stdout, reason = "the errors are the result that a reader of the output wants")]
 
 use std::f64::consts::PI;
 use std::fmt;
@@ -14,11 +15,11 @@ use crate::held_out::path_tracer::{Effort, Irradiance, PathTracer};
 use crate::held_out::random::Random;
 use crate::held_out::scenes;
 
-/// Places in each part of a room.
+/// The number of random places in each volume.
 const PLACES: usize = 150;
 
-/// Errors of E/π in shares of the mean of their room.
-struct Found {
+/// Errors of E/π relative to its mean over the same places.
+struct Errors {
     mean: f64,
     median: f64,
     p95: f64,
@@ -26,7 +27,8 @@ struct Found {
     bias: f64,
 }
 
-impl Found {
+impl Errors {
+    /// Computes the errors from pairs of the probes' value and the true one.
     fn of(pairs: &[(DVec3, DVec3)]) -> Self {
         let count = pairs.len() as f64;
         let mean = pairs.iter().map(|(_, truth)| truth.element_sum() / 3.0).sum::<f64>() / count;
@@ -40,7 +42,7 @@ impl Found {
     }
 }
 
-impl fmt::Display for Found {
+impl fmt::Display for Errors {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { mean, median, p95, rmse, bias } = self;
         let [median, p95, rmse, bias] = [median, p95, rmse, bias].map(|share| 100.0 * share);
@@ -51,7 +53,7 @@ impl fmt::Display for Found {
     }
 }
 
-/// Where a ball of this radius has room, between these corners.
+/// Random places between two corners at which a ball of this radius fits.
 fn places(tracer: &PathTracer, [low, high]: [DVec3; 2], radius: f64, random: &mut Random) -> Vec<DVec3> {
     let mut places = Vec::new();
     while places.len() < PLACES {
@@ -76,23 +78,23 @@ fn direction(random: &mut Random) -> DVec3 {
     }
 }
 
-/// A baked scene, what it is judged by, and its probes.
-struct Judge {
+/// The probes of a baked scene, and the path tracer of the same scene.
+struct ProbeTest {
     tracer: PathTracer,
     volume: IrradianceVolume,
     place: VolumePlace,
     random: Random,
 }
 
-/// Which sides of a ball.
+/// The directions of the ball's surface that are tested.
 #[derive(Clone, Copy, PartialEq)]
 enum Sides {
     Any,
-    /// Those that a probe knows.
+    /// The six directions for which a probe stores a value.
     AlongAxes,
 }
 
-impl Judge {
+impl ProbeTest {
     fn new(spacing: Option<f64>, quality: Quality) -> Self {
         let mut world = scenes::rooms(0, 1.0);
         let tracer = PathTracer::new(&mut world);
@@ -114,8 +116,9 @@ impl Judge {
         Self { tracer, volume: volume.clone(), place, random: Random::new(5) }
     }
 
-    /// Errors at random places between two corners that are so far from everything, with the probes' marks and without.
-    fn judge(&mut self, [low, high]: [DVec3; 2], radius: f64, sides: Sides) -> [Found; 2] {
+    /// Measures the errors at random places between two corners that are at least `radius` away from all surfaces. The
+    /// second result is without the marks of probes inside of solids.
+    fn errors(&mut self, [low, high]: [DVec3; 2], radius: f64, sides: Sides) -> [Errors; 2] {
         let places: Vec<_> = places(&self.tracer, [low, high], radius, &mut self.random)
             .into_iter()
             .map(|place| {
@@ -130,19 +133,19 @@ impl Judge {
             let light = |(&(point, normal), truth): (&(DVec3, DVec3), &Irradiance)| {
                 (volume.light(&self.place, point, normal), truth.value / PI)
             };
-            Found::of(&places.iter().zip(&truth).map(light).collect::<Vec<_>>())
+            Errors::of(&places.iter().zip(&truth).map(light).collect::<Vec<_>>())
         })
     }
 }
 
-/// The corners of a part of a room.
+/// The corners of the part of the rooms between two x coordinates.
 fn between(west: f64, east: f64) -> [DVec3; 2] {
     [DVec3::new(west, 0.0, 0.0), DVec3::new(east, 2.6, 3.6)]
 }
 
 #[test]
 fn a_ball_in_two_rooms() {
-    let mut judge = Judge::new(None, Quality::Final);
+    let mut probe_test = ProbeTest::new(None, Quality::Final);
     let [lit_axes, lit, dark_axes, dark] = [
         ("lit room, sides along the axes", between(-4.0, 0.0), Sides::AlongAxes),
         ("lit room, any side", between(-4.0, 0.0), Sides::Any),
@@ -150,32 +153,32 @@ fn a_ball_in_two_rooms() {
         ("dark room, any side", between(0.15, 4.15), Sides::Any),
     ]
     .map(|(name, corners, sides)| {
-        let [found, _] = judge.judge(corners, 0.2, sides);
+        let [found, _] = probe_test.errors(corners, 0.2, sides);
         println!("{name}: {found}");
         found
     });
-    // Between probes a quarter of a metre apart the light of a room is nearly straight.
+    // Between probes a quarter of a metre apart, the light of a room is nearly linear.
     assert!(lit_axes.median < 0.02 && lit_axes.p95 < 0.08 && lit_axes.bias.abs() < 0.02, "{lit_axes}");
     assert!(dark_axes.median < 0.08 && dark_axes.p95 < 0.25 && dark_axes.bias.abs() < 0.04, "{dark_axes}");
-    // What six numbers can tell of a side that is tilted towards a lamp, or away from it.
+    // Six values per probe cannot represent a side that is tilted towards a lamp, or away from it, any better.
     assert!(lit.median < 0.12 && lit.rmse < 0.45 && lit.bias.abs() < 0.06, "{lit}");
     assert!(dark.median < 0.14 && dark.rmse < 0.45 && dark.bias.abs() < 0.06, "{dark}");
 }
 
 #[test]
-fn beside_a_wall_that_stands_between_light_and_dark() {
-    // Of 15 cm; in the shelter of it nothing comes straight from the lit room.
-    let shelter = between(0.15, 0.28);
-    // With cells of 27 cm no probe stands in the wall, with cells of 15 cm there are some.
-    let [mut coarse, mut fine] = [None, Some(0.15)].map(|spacing| Judge::new(spacing, Quality::Draft));
-    let [through, _] = coarse.judge(shelter, 0.01, Sides::AlongAxes);
-    let [marked, unmarked] = fine.judge(shelter, 0.01, Sides::AlongAxes);
+fn beside_a_wall_between_light_and_dark() {
+    // The wall is 15 cm thick; directly behind it, no light arrives directly from the lit room.
+    let behind_wall = between(0.15, 0.28);
+    // With cells of 27 cm no probe is inside the wall, with cells of 15 cm some are.
+    let [mut coarse, mut fine] = [None, Some(0.15)].map(|spacing| ProbeTest::new(spacing, Quality::Draft));
+    let [through, _] = coarse.errors(behind_wall, 0.01, Sides::AlongAxes);
+    let [marked, unmarked] = fine.errors(behind_wall, 0.01, Sides::AlongAxes);
     println!("beside the wall, cells of 27 cm: {through}");
     println!("beside the wall, cells of 15 cm: {marked}");
     println!("beside the wall, cells of 15 cm, without marks: {unmarked}");
     assert!(marked.bias.abs() < 0.1 && marked.p95 < 0.8, "{marked}");
-    // Negative control: the same probes, and nothing known of the wall.
+    // Negative control: the same probes without the marks of those inside the wall.
     assert!(unmarked.bias > 0.2, "{unmarked}");
-    // What the documentation says of walls that no probe stands in.
+    // The bound that the documentation states for walls without a probe inside.
     assert!(through.bias < 0.5, "{through}");
 }

@@ -1,4 +1,5 @@
-//! Irradiance probes against closed forms: closed boxes, a lit plane, solids between the probes; when they are called for.
+//! Irradiance probes against closed forms: closed boxes, a lit plane, solids that enclose probes. Also tests when
+//! probes are baked at all.
 
 use std::sync::Arc;
 
@@ -16,20 +17,12 @@ fn draft() -> BakeOptions {
     BakeOptions { density: Density::MapSize(32), quality: Quality::Draft, ..BakeOptions::default() }
 }
 
-/// A box seen from inside.
 fn room(size: Vec3) -> Mesh {
-    let mut mesh = shapes::cuboid(size, 1);
-    for triangle in mesh.indices.chunks_exact_mut(3) {
-        triangle.swap(1, 2);
-    }
-    for normal in &mut mesh.normals {
-        *normal = -*normal;
-    }
-    Mesh(Arc::new(mesh))
+    Mesh(Arc::new(crate::common::shapes::room(size)))
 }
 
-/// Something that moves, small, at a place.
-fn moving(world: &mut World, place: DVec3, size: f32) {
+/// Adds a small dynamic object.
+fn add_dynamic(world: &mut World, place: DVec3, size: f32) {
     let mesh = Mesh(Arc::new(shapes::cuboid(Vec3::splat(size), 1)));
     world.spawn((mesh, DynamicObject, Transform::from_translation(place)));
 }
@@ -51,34 +44,34 @@ fn volume(world: &mut World) -> (IrradianceVolume, Vec<DVec3>) {
 
 #[test]
 fn inside_a_shining_box_every_side_has_its_radiance() {
-    // Black walls of radiance L: E/π = L for every side of every probe, by Lambert's formula without sampling.
+    // Black walls of radiance L: E/π = L for every side of every probe. Lambert's formula gives it without sampling.
     let radiance = Vec3::new(1.0, 0.5, 0.25);
     let mut world = World::new();
     world.spawn((room(Vec3::new(2.0, 1.0, 1.5)), matt(Vec3::ZERO, radiance), StaticObject));
-    moving(&mut world, DVec3::ZERO, 0.1);
+    add_dynamic(&mut world, DVec3::ZERO, 0.1);
     let report = run(&mut world, &draft());
     let (volume, _) = volume(&mut world);
     assert_eq!(report.probes.inside, 0, "{:?}", report.probes);
     assert!(volume.cubes.len() > 2000 && volume.cubes.len() <= 4096, "{:?}", report.probes);
     assert_eq!(report.probes.resolution, volume.resolution.to_array());
     for side in volume.cubes.iter().flat_map(|cube| cube.0) {
-        // Twelve clipped triangles' angles in f64, then a dozen roundings in f32.
+        // The angles of twelve clipped triangles are computed in f64, followed by a dozen roundings in f32.
         assert!((side / radiance - 1.0).abs().max_element() < 3e-6, "{side}");
     }
 }
 
 #[test]
 fn furnace() {
-    // Reflectance ρ in a closed box: E/π = L / (1 - ρ), of which L comes from the walls themselves.
+    // A closed box of reflectance ρ: E/π = L / (1 - ρ), of which L is the walls' emission.
     for (real_time, reflectance) in [(false, 0.5f32), (true, 0.8)] {
         let mut world = World::new();
         let walls = matt(Vec3::splat(reflectance), Vec3::new(1.0, 0.5, 0.25));
         let walls = world.spawn((room(Vec3::new(2.0, 1.0, 1.5)), walls, StaticObject)).id();
         if real_time {
-            // A polygon light in the frame: what it sends there directly must not count twice.
+            // The walls are lights in real time: their direct light must not count twice.
             world.entity_mut(walls).insert(EmissiveLight);
         }
-        moving(&mut world, DVec3::ZERO, 0.1);
+        add_dynamic(&mut world, DVec3::ZERO, 0.1);
         let report = run(&mut world, &BakeOptions { probe_spacing: Some(0.25), ..draft() });
         let (volume, _) = volume(&mut world);
         assert_eq!(volume.resolution, UVec3::new(8, 4, 6));
@@ -86,7 +79,7 @@ fn furnace() {
         let expected = 1.0 / (1.0 - reflectance) - if real_time { 1.0 } else { 0.0 };
         let sides: Vec<f32> = volume.cubes.iter().flat_map(|cube| cube.0).map(|side| side.x).collect();
         let mean = sides.iter().sum::<f32>() / sides.len() as f32;
-        // As for the lightmap: even light is exact, what is left is the form factors' error.
+        // As in the lightmap, uniform light is exact; what remains is the error of the form factors.
         assert!((mean / expected - 1.0).abs() < 5e-3, "{mean} instead of {expected}");
         let worst = sides.iter().map(|side| (side / expected - 1.0).abs()).fold(0.0, f32::max);
         assert!(worst < 0.03, "{worst}");
@@ -95,7 +88,8 @@ fn furnace() {
     }
 }
 
-/// The form factor from a point with a normal to the square |x|, |z| <= half at y = 0 seen from above, by the midpoint rule.
+/// The form factor from a point with a normal to the upper side of the square |x|, |z| <= half at y = 0, by the
+/// midpoint rule.
 fn form_factor(point: DVec3, normal: DVec3, half: f64) -> f64 {
     const STEPS: i32 = 600;
     let step = 2.0 * half / f64::from(STEPS);
@@ -113,7 +107,7 @@ fn form_factor(point: DVec3, normal: DVec3, half: f64) -> f64 {
 
 #[test]
 fn above_a_lit_plane() {
-    // A floor under the sun: E is the same everywhere on it, so B = ρ E and a probe's side has B F / π.
+    // A floor under the sun: E is the same everywhere on it, so that B = ρ E and a side of a probe has B F / π.
     let (half, reflectance, sun) = (8.0, 0.5, 3.0f32);
     let mut world = World::new();
     let corner = half as f32;
@@ -127,14 +121,14 @@ fn above_a_lit_plane() {
     world.spawn((Mesh(Arc::new(floor)), matt(Vec3::splat(reflectance), Vec3::ZERO), StaticObject));
     let down = Transform::default().looking_at(DVec3::NEG_Y, DVec3::X);
     world.spawn((Light { bake: BakeMode::Static, ..Light::directional(Vec3::splat(sun)) }, down));
-    moving(&mut world, DVec3::new(0.0, 2.0, 0.0), 0.5);
+    add_dynamic(&mut world, DVec3::new(0.0, 2.0, 0.0), 0.5);
     let options = BakeOptions { probe_spacing: Some(1.0), quality: Quality::Final, ..draft() };
     let report = run(&mut world, &options);
     let (volume, centers) = volume(&mut world);
     let (mut squares, mut errors, mut sum, mut count, mut worst) = (0.0, 0.0, 0.0, 0.0, 0.0f64);
     for (cube, center) in volume.cubes.iter().zip(&centers).filter(|(_, center)| center.y > 0.0).step_by(37) {
         for (side, normal) in cube.0.iter().zip(SIDES) {
-            // E = π L_d for light that arrives straight from above.
+            // E = π L_d on the floor for light from straight above.
             let expected = f64::from(reflectance * sun) * form_factor(*center, normal, half);
             let error = f64::from(side.x) - expected;
             squares += error * error;
@@ -147,16 +141,17 @@ fn above_a_lit_plane() {
     let (mean, rmse, bias) = (sum / count, (squares / count).sqrt(), errors / count);
     let sigma = report.probes.estimated_error * mean;
     assert!(count > 50.0 && mean > 0.1, "{count} {mean}");
-    // Independent rays would leave each side with a variance of at most (16 / N) L² ∫ cos² / 4π = 16 L² / 6 N: 512 spread ones less.
+    // N independent rays would leave each side a variance of at most (16 / N) L² ∫ cos² / 4π = 16 L² / 6 N; 512
+    // stratified ones leave less.
     let independent = f64::from(reflectance * sun) * (16.0 / (6.0 * 512.0f64)).sqrt();
-    // The estimate is of all probes, the errors of every 37th; sides that look down have more of both than those that look up.
+    // The estimate is for all probes, the measured errors are those of every 37th.
     assert!(sigma > 0.0 && sigma < independent, "{:?}", report.probes);
     assert!(rmse < 2.0 * sigma, "{rmse}, estimated {sigma}");
     assert!(bias.abs() < 5.0 * sigma / count.sqrt(), "{bias} of {sigma}");
     assert!(worst < 10.0 * sigma, "{worst} of {sigma}");
 }
 
-/// A room with a lamp and a crate on its floor, and something that moves.
+/// A room with a lamp, a crate on its floor, and a dynamic object.
 fn furnished(scale: f32) -> World {
     let mut world = World::new();
     let place = |x: f32, y: f32, z: f32| Transform::from_translation((Vec3::new(x, y, z) * scale).as_dvec3());
@@ -168,12 +163,12 @@ fn furnished(scale: f32) -> World {
     let lamp = matt(Vec3::splat(0.25), Vec3::new(9.0, 6.0, 3.0));
     let size = Vec3::new(0.5, 0.125, 0.5);
     world.spawn((Name::new("lamp"), solid(size), lamp, StaticObject, place(-0.5, 0.75, 0.0)));
-    moving(&mut world, (Vec3::new(1.5, -0.5, 0.0) * scale).as_dvec3(), 0.25 * scale);
+    add_dynamic(&mut world, (Vec3::new(1.5, -0.5, 0.0) * scale).as_dvec3(), 0.25 * scale);
     world
 }
 
 #[test]
-fn probes_in_a_crate_have_the_light_around_it() {
+fn probes_inside_a_crate_get_the_light_around_it() {
     let mut world = furnished(1.0);
     let report = run(&mut world, &BakeOptions { probe_spacing: Some(0.25), ..draft() });
     let (volume, centers) = volume(&mut world);
@@ -189,7 +184,7 @@ fn probes_in_a_crate_have_the_light_around_it() {
         let chosen = volume.cubes.iter().zip(&centers).filter(|(_, center)| within(center) == inside);
         chosen.flat_map(|(cube, _)| cube.0).map(|side| side.x).fold(f32::INFINITY, f32::min)
     };
-    // Means of what is around cannot be darker than the darkest of it.
+    // Probes inside of solids get means of those around them, which cannot be darker than the darkest of these.
     assert!(darkest(true) >= darkest(false) && darkest(false) > 0.0, "{} {}", darkest(true), darkest(false));
 }
 
@@ -210,7 +205,7 @@ fn the_same_bits_on_any_thread_and_at_any_scale() {
 }
 
 #[test]
-fn only_where_something_moves() {
+fn probes_are_baked_only_if_something_is_dynamic() {
     let skipped = |report: &BakeReport| {
         report.skipped.iter().find(|line| line.starts_with("probes: ")).cloned().unwrap_or_default()
     };
@@ -226,20 +221,20 @@ fn only_where_something_moves() {
     assert_eq!(volumes(&mut world), 0);
     let report = run(&mut world, &BakeOptions { probes: Probes::Always, ..coarse });
     assert_eq!((skipped(&report), report.probes.resolution, volumes(&mut world)), (String::new(), [2; 3], 1));
-    // Another bake puts another volume in the place of this one, or none.
+    // Another bake replaces this volume by a new one or removes it.
     run(&mut world, &BakeOptions { probes: Probes::Always, probe_spacing: Some(0.25), ..coarse });
     assert_eq!(volume(&mut world).0.resolution, UVec3::splat(4));
-    moving(&mut world, DVec3::ZERO, 0.1);
+    add_dynamic(&mut world, DVec3::ZERO, 0.1);
     let report = run(&mut world, &BakeOptions { probes: Probes::Never, ..coarse });
     assert!(skipped(&report).contains("switched off") && report.probes.resolution == [0; 3]);
     assert_eq!(volumes(&mut world), 0);
     assert!(report.stages.iter().all(|stage| stage.stage != "probes"));
 
-    // A static point light over black walls: a frame lights what moves with it, and nothing bounces.
+    // A static point light in a black room: frames light dynamic objects with it directly, and nothing bounces.
     let mut dark = World::new();
     dark.spawn((room(Vec3::ONE), matt(Vec3::ZERO, Vec3::ZERO), StaticObject));
     dark.spawn((Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) }, Transform::default()));
-    moving(&mut dark, DVec3::ZERO, 0.1);
+    add_dynamic(&mut dark, DVec3::ZERO, 0.1);
     assert!(skipped(&run(&mut dark, &coarse)).contains("nothing bounces"));
 
     for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY] {

@@ -1,9 +1,11 @@
-//! A baked level as a program that is not ours finds it: the .glb by the `gltf` crate, the KTX2 by the `ktx2` crate and by its bytes,
-//! judged by what Bevy documents for its `Lightmap`. Nothing of `lumbre_scene` reads here, except where both are compared.
+//! A baked level as read by other software: the .glb by the `gltf` crate, the KTX2 files by the `ktx2` crate and byte
+//! by byte, checked against what Bevy documents for its `Lightmap`. The readers of `lumbre_scene` are used only for
+//! comparison.
 //!
-//! Bevy's contract (`bevy_pbr::Lightmap` and its shader): the mesh's second UV channel (`ATTRIBUTE_UV_1`, glTF's TEXCOORD_1) in [0, 1],
-//! v = 0 the top row; a 2D float texture that can be filtered, linear, not sRGB; texel x `lightmap_exposure` x diffuse colour is the
-//! radiance, so a texel is E/π with an exposure of 1 (where the camera's own exposure is 1).
+//! Bevy's contract (`bevy_pbr::Lightmap` and its shader): the mesh's second UV channel (`ATTRIBUTE_UV_1`, glTF's
+//! TEXCOORD_1) is in [0, 1] with v = 0 at the top row; the texture is 2D, float, filterable and linear (not sRGB); the
+//! radiance is texel x `lightmap_exposure` x diffuse colour, so that a texel is E/π for an exposure of 1 (if the
+//! camera's exposure is 1, too).
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -22,12 +24,14 @@ struct Texture {
 }
 
 impl Texture {
-    /// Header by the `ktx2` crate, texels by the words of the Vulkan specification.
+    /// Reads the header with the `ktx2` crate, and decodes the texels as the Vulkan specification defines their
+    /// formats.
     fn read(path: &Path) -> Self {
         let bytes = std::fs::read(path).expect("the KTX2 image lies beside the level");
         let reader = ktx2::Reader::new(&bytes[..]).expect("Bevy's reader takes it");
         let header = reader.header();
-        // Bevy takes a picture without depth, layers and more faces than one for a 2D texture; of one row for a 1D texture.
+        // Bevy treats an image without depth, layers and several faces as a 2D texture, but one of a single row as a 1D
+        // texture.
         assert_eq!(
             (header.pixel_depth, header.layer_count, header.face_count, header.level_count),
             (0, 0, 1, 1)
@@ -35,7 +39,7 @@ impl Texture {
         assert!(header.pixel_width > 1 && header.pixel_height > 1);
         assert_eq!(reader.transfer_function(), Some(ktx2::TransferFunction::Linear));
         assert_eq!(reader.color_model(), Some(ktx2::ColorModel::RGBSDA));
-        // What the size of a frame says by its own: nothing is compressed here, so that no decoder is trusted.
+        // The files are saved without supercompression, so that no decoder has to be trusted.
         assert_eq!(header.supercompression_scheme, None);
         let level = reader.levels().next().expect("there is a level");
         let (width, height) = (header.pixel_width as usize, header.pixel_height as usize);
@@ -69,27 +73,31 @@ impl Texture {
         Self { width, height, texels }
     }
 
-    /// As a GPU filters it, clamped at the border.
+    /// Samples the texture as a GPU does, with bilinear filtering and clamping at the border.
     fn sample(&self, uv: DVec2) -> DVec3 {
         let at = uv * DVec2::new(self.width as f64, self.height as f64) - 0.5;
-        let (low, part) = (at.floor(), at - at.floor());
+        let (low, fraction) = (at.floor(), at - at.floor());
         let read = |x: f64, y: f64| {
             let column = (low.x + x).clamp(0.0, self.width as f64 - 1.0) as usize;
             let row = (low.y + y).clamp(0.0, self.height as f64 - 1.0) as usize;
             self.texels[row * self.width + column]
         };
-        read(0.0, 0.0).lerp(read(1.0, 0.0), part.x).lerp(read(0.0, 1.0).lerp(read(1.0, 1.0), part.x), part.y)
+        let (top, bottom) = (
+            read(0.0, 0.0).lerp(read(1.0, 0.0), fraction.x),
+            read(0.0, 1.0).lerp(read(1.0, 1.0), fraction.x),
+        );
+        top.lerp(bottom, fraction.y)
     }
 }
 
-/// A lightmapped triangle in the world.
+/// A lightmapped triangle in world space.
 struct Face {
     corners: [DVec3; 3],
     uv: [DVec2; 3],
     texture: String,
 }
 
-/// What a client finds in a baked level.
+/// The lightmapped triangles and lightmaps that a client reads from a baked level.
 struct Client {
     faces: Vec<Face>,
     textures: HashMap<String, Texture>,
@@ -102,11 +110,11 @@ impl Client {
         assert!(gltf.extensions_required().next().is_none(), "any viewer may open it");
         let (mut faces, mut textures) = (Vec::new(), HashMap::new());
         let scene = gltf.default_scene().expect("there is a scene");
-        let mut open: Vec<_> = scene.nodes().map(|node| (node, DMat4::IDENTITY)).collect();
-        while let Some((node, above)) = open.pop() {
+        let mut pending: Vec<_> = scene.nodes().map(|node| (node, DMat4::IDENTITY)).collect();
+        while let Some((node, parent)) = pending.pop() {
             let local = node.transform().matrix();
-            let matrix = above * DMat4::from_cols_array_2d(&local.map(|column| column.map(f64::from)));
-            open.extend(node.children().map(|child| (child, matrix)));
+            let matrix = parent * DMat4::from_cols_array_2d(&local.map(|column| column.map(f64::from)));
+            pending.extend(node.children().map(|child| (child, matrix)));
             let Some(extension) = node.extension_value("LUMBRE_lightmap") else { continue };
             assert_eq!(extension["texCoord"], 1, "Bevy's UV_1");
             let name = extension["image"].as_str().expect("the image is named").replace("%20", " ");
@@ -143,17 +151,17 @@ impl Client {
         Self { faces, textures }
     }
 
-    /// What Bevy reflects there for a white diffuse material with an exposure of 1.
+    /// The radiance that Bevy shows at a point of a white diffuse material with an exposure of 1.
     fn radiance(&self, position: DVec3, normal: DVec3) -> Option<DVec3> {
         self.faces.iter().find_map(|face| {
             let [a, b, c] = face.corners;
             let cross = (b - a).cross(c - a);
             let size = cross.length();
             let facing = cross / size;
-            let apart = position - a;
-            let u = apart.cross(c - a).dot(facing) / size;
-            let v = (b - a).cross(apart).dot(facing) / size;
-            let near = apart.dot(facing).abs() < 1e-3 * size.sqrt();
+            let offset = position - a;
+            let u = offset.cross(c - a).dot(facing) / size;
+            let v = (b - a).cross(offset).dot(facing) / size;
+            let near = offset.dot(facing).abs() < 1e-3 * size.sqrt();
             let within = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
             let uv = face.uv[0] + (face.uv[1] - face.uv[0]) * u + (face.uv[2] - face.uv[0]) * v;
             (near && within && facing.dot(normal) > 0.99).then(|| self.textures[&face.texture].sample(uv))
@@ -185,7 +193,7 @@ fn saved(world: &mut World, path: &Path, format: PackedFormat) {
     assert!(report.lightmaps.iter().any(|file| file.encoding == format.name()));
     for file in &report.lightmaps {
         assert_eq!((file.error.saturated, file.error.negative), (0, 0), "{file:?}");
-        // Floats of 10 bits are off by at most 1/64, and by a third of that on average.
+        // Floats of 10 bits have a relative error of at most 1/64, and of a third of that on average.
         assert!(file.error.relative_rmse < 0.02, "{file:?}");
     }
 }
@@ -220,8 +228,8 @@ fn the_cornell_box_as_bevy_finds_it() {
         assert!(errors.len() * 10 > points.len() * 9, "{} of {} points found", errors.len(), points.len());
         mean /= errors.len() as f64;
         errors.sort_by(f64::total_cmp);
-        // Units, rows and channels: each would be off by more than the whole if it were another. A draft at 128 texels is within some
-        // per cent of the converged light.
+        // Wrong units, swapped rows or swapped channels would cause a far larger error. A draft with 128 texels a side
+        // is within some per cent of the converged light.
         let median = errors[errors.len() / 2] / mean;
         assert!(median < 0.03, "{format:?}: median error {median}");
     }
@@ -241,8 +249,8 @@ fn the_ktx2_shows_what_the_open_exr_shows() {
             common::maps(&mut world)
         };
         let open_exr = maps(&path);
-        // A level that names the KTX2 images instead. A frame is linear in what they hold, and its filter a mean of texels: what bounds
-        // the texels bounds the frame.
+        // A level that refers to the KTX2 images instead. A frame is linear in the texels and filtering averages them,
+        // so that a bound for the texels also holds for the frame.
         let text = std::fs::read_to_string(&path).expect("a .gltf is text");
         let other = path.with_file_name("other.gltf");
         std::fs::write(&other, text.replace(".exr", ".ktx2")).expect("the folder takes it");
@@ -254,7 +262,7 @@ fn the_ktx2_shows_what_the_open_exr_shows() {
             let independent = Texture::read(&path.with_file_name(name));
             for ((half, texel), client) in open_exr.texels.iter().zip(&packed.texels).zip(&independent.texels)
             {
-                // Both came from the same floats: a half is off by 1/2048 of a channel, or by 2^-25.
+                // Both were encoded from the same floats; a half has an error of 1/2048 of a channel, or of 2^-25.
                 let bound = format.largest_error(*half * 1.001)
                     + (*half / 2047.0).max(glam::Vec3::splat(2f32.powi(-25)));
                 assert!((*half - *texel).abs().cmple(bound).all(), "{half} and {texel}");
@@ -266,36 +274,38 @@ fn the_ktx2_shows_what_the_open_exr_shows() {
     }
 }
 
-/// A KTX2 file by the bytes of its specification (version 2.0, revision 4): what stands where, and the data format descriptor of the
-/// Khronos Data Format Specification 1.3. Nothing reads here but this.
+/// Checks the bytes of a KTX2 file against its specification (version 2.0, revision 4), and the data format descriptor
+/// against the Khronos Data Format Specification 1.3, without any library.
 fn check_bytes(path: &Path, format: PackedFormat, width: u32, height: u32) {
     let bytes = std::fs::read(path).expect("the image lies beside the level");
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
     let long = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight bytes")) as usize;
     assert_eq!(bytes[..12], [0xAB, b'K', b'T', b'X', b' ', b'2', b'0', 0xBB, b'\r', b'\n', 0x1A, b'\n']);
-    // VK_FORMAT_B10G11R11_UFLOAT_PACK32 = 122, VK_FORMAT_E5B9G9R9_UFLOAT_PACK32 = 123; a word is swapped as a whole.
+    // VK_FORMAT_B10G11R11_UFLOAT_PACK32 = 122, VK_FORMAT_E5B9G9R9_UFLOAT_PACK32 = 123; the type size is that of a
+    // 32-bit word.
     let vulkan = if format == PackedFormat::Rgb9E5 { 123 } else { 122 };
     assert_eq!([word(12), word(16)], [vulkan, 4]);
     // Width, height, depth, layers, faces, levels, supercompression.
     assert_eq!([20, 24, 28, 32, 36, 40, 44].map(word), [width, height, 0, 0, 1, 1, 0]);
     let (descriptor, length) = (word(48) as usize, word(52) as usize);
-    // The index of the one level follows the header: where, how many bytes, and as many unpacked.
+    // The index of the one level follows the header: its offset, its length in bytes, and the same length uncompressed.
     let (at, size) = (long(80), 4 * width as usize * height as usize);
     assert_eq!([long(88), long(96)], [size, size]);
     assert_eq!(at % 4, 0, "texels begin at a multiple of their size");
     assert!(at >= descriptor + length && at + size == bytes.len());
     assert_eq!(descriptor, 104, "after the level index");
-    assert_eq!(word(descriptor) as usize, length, "it says its own length");
-    // Khronos' basic descriptor, version 2, of so many bytes.
+    assert_eq!(word(descriptor) as usize, length, "it states its own length");
+    // Khronos' basic descriptor block, version 2, with its size.
     assert_eq!([word(descriptor + 4), word(descriptor + 8)], [0, 2 | (length as u32 - 4) << 16]);
-    // RGBSDA, BT.709, linear, straight alpha; texel blocks of one by one; four bytes in plane 0.
+    // RGBSDA, BT.709, linear, straight alpha; texel blocks of 1 by 1; four bytes in plane 0.
     assert_eq!(bytes[descriptor + 12..descriptor + 16], [1, 1, 1, 0]);
     assert_eq!([word(descriptor + 16), word(descriptor + 20), word(descriptor + 24)], [0, 4, 0]);
     let samples: Vec<[u32; 3]> = (descriptor + 28..descriptor + length)
         .step_by(16)
         .map(|at| [word(at) & 0xffff, word(at) >> 16 & 0xff, word(at) >> 24])
         .collect();
-    // First bit, bits less one, and channel: red, green, blue; 0x20 an exponent, 0x80 a float.
+    // The first bit, the number of bits minus one, and the channel (red, green, blue); 0x20 marks an exponent, 0x80 a
+    // float.
     let expected: &[[u32; 3]] = match format {
         PackedFormat::Rgb9E5 => {
             &[[0, 8, 0], [27, 4, 0x20], [9, 8, 1], [27, 4, 0x21], [18, 8, 2], [27, 4, 0x22]]
@@ -308,7 +318,7 @@ fn check_bytes(path: &Path, format: PackedFormat, width: u32, height: u32) {
 #[test]
 fn the_demo_level_as_bevy_finds_it() {
     let model = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/demo.glb"));
-    // The files are asked for, not the light: few texels and a rough error.
+    // This tests the files and not the light, so that few texels and a large error suffice.
     let mut world = baked(model, Density::TexelsPerMeter(1.5), 0.5);
     let ours = common::maps(&mut world);
     let folder = tempfile::tempdir().expect("there is room for it");
@@ -318,7 +328,7 @@ fn the_demo_level_as_bevy_finds_it() {
         saved(&mut world, &path, format);
         let client = Client::read(&path);
         assert!(client.faces.len() > 10_000, "{} triangles have a lightmap", client.faces.len());
-        // One file for each map of the bake, under its name, with its light.
+        // There is one file for each map of the bake, with its name and its light.
         assert_eq!(client.textures.len(), ours.len());
         let mut lit = 0;
         for (name, image) in &ours {
@@ -337,7 +347,7 @@ fn the_demo_level_as_bevy_finds_it() {
             }
         }
         assert!(lit > 1000, "{lit} texels are lit");
-        // Every static mesh of the level has one, and nothing that moves has: by the names of the nodes.
+        // By the names of the nodes, every static mesh of the level has a lightmap, and no dynamic one has.
         let read = |path: &Path| gltf::Gltf::open(path).expect("the gltf crate takes the level");
         let (plain, baked) = (read(model), read(&path));
         let mapped: Vec<&str> = baked
@@ -351,16 +361,16 @@ fn the_demo_level_as_bevy_finds_it() {
         let (mut still, mut moves) = (0, 0);
         for node in plain.nodes().filter(|node| node.mesh().is_some()) {
             let name = node.name().expect("the level's nodes have names");
-            let alone = !moving(&node) && !under_a_moving_node(&plain, node.index(), &moving);
-            assert_eq!(mapped.contains(&name), alone, "{name}");
-            still += usize::from(alone);
-            moves += usize::from(!alone);
+            let is_static = !moving(&node) && !under_a_moving_node(&plain, node.index(), &moving);
+            assert_eq!(mapped.contains(&name), is_static, "{name}");
+            still += usize::from(is_static);
+            moves += usize::from(!is_static);
         }
-        assert!(still > 20 && moves > 2, "{still} stand still, {moves} move");
+        assert!(still > 20 && moves > 2, "{still} are static, {moves} are dynamic");
     }
 }
 
-/// Whether a node's parent, or its parent's, moves.
+/// Whether any ancestor of a node is dynamic.
 fn under_a_moving_node(level: &gltf::Gltf, node: usize, moving: &impl Fn(&gltf::Node<'_>) -> bool) -> bool {
     let parent = level.nodes().find(|parent| parent.children().any(|child| child.index() == node));
     parent.is_some_and(|parent| moving(&parent) || under_a_moving_node(level, parent.index(), moving))

@@ -1,7 +1,8 @@
-//! Baking again what a change can have affected: the result is within the stated errors of a bake of everything, what cannot have changed is
-//! kept, and the report says so. Two rooms joined by a doorway, one of them lit.
+//! Rebakes: after a change, only what it can have affected is baked again. The result must agree with a full bake
+//! within the stated errors, unaffected samples must be reused, and the report must say so. The scene has two rooms
+//! joined by a doorway, one of them lit.
 
-#![allow(clippy::print_stdout, reason = "the shares are what one wants to see of it")]
+#![allow(clippy::print_stdout, reason = "the shares are the result that a reader of the output wants")]
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -12,14 +13,13 @@ use lumbre_bake::{
     Bake, BakeOptions, BakeReport, Checkpoint, Density, Probes, Samples, SamplesError, TexelErrors,
 };
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
+use crate::common::shapes::room;
+
 fn matt(reflectance: Vec3, emission: f32) -> Material {
-    Material {
-        front: Surface { diffuse: reflectance, emission: Vec3::splat(emission), ..Surface::default() },
-        ..Material::default()
-    }
+    crate::scene_parts::matt(reflectance, Vec3::splat(emission))
 }
 
 fn place(world: &mut World, name: &str, mesh: TriangleMesh, material: Material, at: Vec3) {
@@ -27,19 +27,17 @@ fn place(world: &mut World, name: &str, mesh: TriangleMesh, material: Material, 
     world.spawn((Name::new(name.to_owned()), Mesh(Arc::new(mesh)), material, transform, StaticObject));
 }
 
-/// A crate: where, and how it reflects.
+/// The position of a crate and its reflectance.
 type Crate = (Vec3, Vec3);
 
 const WHITE: Vec3 = Vec3::new(0.7, 0.7, 0.7);
 const RED: Vec3 = Vec3::new(0.8, 0.2, 0.2);
 
-/// Rooms of 4 x 3 x 4 m at x = 2 and x = -2, a lamp that hangs in the first, a door in the wall between, and crates of 60 cm.
+/// Rooms of 4 x 3 x 4 m at x = 2 and x = -2 with a doorway in the wall between them, a lamp in the first, and crates of
+/// 60 cm.
 fn rooms(lamp: Vec3, crates: &[Crate]) -> World {
     let mut world = World::new();
-    let mut shell = shapes::cuboid(Vec3::new(8.0, 3.0, 4.0), 1);
-    shell.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
-    shell.normals.iter_mut().for_each(|normal| *normal = -*normal);
-    place(&mut world, "shell", shell, matt(WHITE, 0.0), Vec3::ZERO);
+    place(&mut world, "shell", room(Vec3::new(8.0, 3.0, 4.0)), matt(WHITE, 0.0), Vec3::ZERO);
     let wall = |z: f32| shapes::cuboid(Vec3::new(0.2, 2.98, z), 1);
     place(&mut world, "wall", wall(2.9), matt(WHITE, 0.0), Vec3::new(0.0, 0.0, -0.54));
     place(&mut world, "lamp", shapes::cuboid(Vec3::new(0.8, 0.05, 0.8), 1), matt(Vec3::ZERO, 10.0), lamp);
@@ -64,7 +62,7 @@ fn options() -> BakeOptions {
     }
 }
 
-/// Light and stated error of every texel, by the names of the maps.
+/// The value and the stated error of every texel, with the maps sorted by name.
 fn texels(world: &mut World) -> (Vec<DVec3>, Vec<f32>) {
     let mut query = world.query::<(&Lightmap, &TexelErrors)>();
     let mut maps: Vec<_> =
@@ -80,8 +78,9 @@ fn baked(mut world: World, former: Option<&Samples>, options: &BakeOptions) -> (
     (world, report, samples.expect("there is light"))
 }
 
-/// RMSE of the difference of two bakes relative to the mean, and the share of texels that differ by at most twice what both state.
-fn apart(mut a: World, mut b: World) -> (f64, f64) {
+/// The RMS difference of two bakes relative to the mean, and the share of texels that differ by at most twice the
+/// stated errors of both.
+fn difference(mut a: World, mut b: World) -> (f64, f64) {
     let ((a, of_a), (b, of_b)) = (texels(&mut a), texels(&mut b));
     assert_eq!(a.len(), b.len(), "the maps have the same texels");
     let (mut squares, mut within, mut mean, mut count) = (0.0, 0.0, 0.0, 0.0);
@@ -89,22 +88,23 @@ fn apart(mut a: World, mut b: World) -> (f64, f64) {
         if !(of_a.is_finite() && of_b.is_finite()) {
             continue;
         }
-        let apart = (*a - *b).length() / 3f64.sqrt();
-        squares += apart * apart;
-        within += f64::from(u8::from(apart <= 2.0 * f64::from(of_a.hypot(*of_b))));
+        let difference = (*a - *b).length() / 3f64.sqrt();
+        squares += difference * difference;
+        within += f64::from(u8::from(difference <= 2.0 * f64::from(of_a.hypot(*of_b))));
         mean += b.element_sum() / 3.0;
         count += 1.0;
     }
     ((squares / count).sqrt() * count / mean, within / count)
 }
 
-/// Bakes a scene, changes it, bakes it again with the samples and whole; both agree within what they state. Returns the report.
-fn changed(before: World, after: impl Fn() -> World) -> BakeReport {
+/// Bakes a scene, and then a changed scene twice: with the samples of the first bake and from scratch. Checks that both
+/// agree within the stated errors, and returns the report of the rebake.
+fn rebake(before: World, after: impl Fn() -> World) -> BakeReport {
     let (_, first, samples) = baked(before, None, &options());
     assert!(first.rebake.is_none(), "there was nothing to keep from");
     let (again, report, _) = baked(after(), Some(&samples), &options());
     let (whole, of_whole, _) = baked(after(), None, &options());
-    let (difference, within) = apart(again, whole);
+    let (difference, within) = difference(again, whole);
     let rebake = report.rebake.as_ref().expect("it says what was kept");
     println!("{rebake}");
     println!(
@@ -137,7 +137,7 @@ fn share(report: &BakeReport, of: impl Fn(&lumbre_bake::RebakeReport) -> usize) 
 #[test]
 fn a_crate_that_moves_in_the_dark_room_leaves_the_lit_one_alone() {
     let moved = (IN_THE_DARK.0 + Vec3::new(0.4, 0.0, 0.3), RED);
-    let report = changed(rooms(LAMP, &[IN_THE_DARK, IN_THE_LIGHT]), || rooms(LAMP, &[moved, IN_THE_LIGHT]));
+    let report = rebake(rooms(LAMP, &[IN_THE_DARK, IN_THE_LIGHT]), || rooms(LAMP, &[moved, IN_THE_LIGHT]));
     assert_eq!(report.rebake.as_ref().map(|r| r.changed.clone()), Some(vec!["crate 0 (changed)".to_owned()]));
     assert!(share(&report, |r| r.gathered) < 0.5, "{:?}", report.rebake);
     assert!(share(&report, |r| r.relit) < 0.5, "{:?}", report.rebake);
@@ -145,25 +145,25 @@ fn a_crate_that_moves_in_the_dark_room_leaves_the_lit_one_alone() {
 
 #[test]
 #[ignore = "slow: scripts/test --all runs it"]
-fn a_lamp_that_changes_its_hue_alone_is_not_missed() {
+fn a_light_that_changes_only_its_hue_is_not_missed() {
     let lit = |color: Vec3| {
         let mut world = rooms(LAMP, &[IN_THE_DARK]);
         let light = Light { bake: BakeMode::Static, ..Light::point(color) };
         world.spawn((light, Transform::from_xyz(2.0, 0.0, -1.0)));
         world
     };
-    // As much light, in another channel.
-    let report = changed(lit(Vec3::new(3.0, 0.0, 0.0)), || lit(Vec3::new(0.0, 3.0, 0.0)));
+    // The same amount of light in another channel.
+    let report = rebake(lit(Vec3::new(3.0, 0.0, 0.0)), || lit(Vec3::new(0.0, 3.0, 0.0)));
     assert!(share(&report, |r| r.gathered) > 0.5, "{:?}", report.rebake);
 }
 
 #[test]
 #[ignore = "slow: scripts/test --all runs it"]
-fn the_back_of_a_screen_hides_what_it_stands_before() {
+fn the_back_of_a_screen_hides_what_is_behind_it() {
     let screened = |screen: bool| {
         let mut world = rooms(LAMP, &[]);
         if screen {
-            // Its only face looks away from the door, down the dark room.
+            // Its only face looks away from the doorway into the dark room.
             let mut sheet = shapes::plane(3.8, 2.9, 1, 1);
             for (position, normal) in sheet.positions.iter_mut().zip(&mut sheet.normals) {
                 (*position, *normal) = (Vec3::new(0.0, position.z, position.x), Vec3::NEG_X);
@@ -176,24 +176,24 @@ fn the_back_of_a_screen_hides_what_it_stands_before() {
         }
         world
     };
-    changed(screened(false), || screened(true));
-    changed(screened(true), || screened(false));
+    rebake(screened(false), || screened(true));
+    rebake(screened(true), || screened(false));
 }
 
 #[test]
 #[ignore = "slow: scripts/test --all runs it"]
 fn a_crate_that_moves_in_the_lit_room_leaves_the_dark_ones_far_end_alone() {
     let moved = (IN_THE_LIGHT.0 + Vec3::new(-0.3, 0.0, -0.2), RED);
-    let report = changed(rooms(LAMP, &[IN_THE_DARK, IN_THE_LIGHT]), || rooms(LAMP, &[IN_THE_DARK, moved]));
+    let report = rebake(rooms(LAMP, &[IN_THE_DARK, IN_THE_LIGHT]), || rooms(LAMP, &[IN_THE_DARK, moved]));
     assert!(share(&report, |r| r.gathered) < 0.95, "{:?}", report.rebake);
 }
 
 #[test]
 #[ignore = "slow: scripts/test --all runs it"]
 fn crates_come_and_go() {
-    let report = changed(rooms(LAMP, &[IN_THE_LIGHT]), || rooms(LAMP, &[IN_THE_LIGHT, IN_THE_DARK]));
+    let report = rebake(rooms(LAMP, &[IN_THE_LIGHT]), || rooms(LAMP, &[IN_THE_LIGHT, IN_THE_DARK]));
     assert_eq!(report.rebake.map(|r| r.changed), Some(vec!["crate 1 (new)".to_owned()]));
-    let report = changed(rooms(LAMP, &[IN_THE_LIGHT, IN_THE_DARK]), || rooms(LAMP, &[IN_THE_LIGHT]));
+    let report = rebake(rooms(LAMP, &[IN_THE_LIGHT, IN_THE_DARK]), || rooms(LAMP, &[IN_THE_LIGHT]));
     assert_eq!(report.rebake.map(|r| r.changed), Some(vec!["crate 1 (gone)".to_owned()]));
 }
 
@@ -201,7 +201,7 @@ fn crates_come_and_go() {
 #[ignore = "slow: scripts/test --all runs it"]
 fn a_crate_that_is_painted_changes_light_by_bounces_only() {
     let painted = (IN_THE_DARK.0, WHITE);
-    let report = changed(rooms(LAMP, &[IN_THE_DARK]), || rooms(LAMP, &[painted]));
+    let report = rebake(rooms(LAMP, &[IN_THE_DARK]), || rooms(LAMP, &[painted]));
     assert!(share(&report, |r| r.gathered) < 0.5, "{:?}", report.rebake);
 }
 
@@ -209,7 +209,7 @@ fn a_crate_that_is_painted_changes_light_by_bounces_only() {
 #[ignore = "slow: scripts/test --all runs it"]
 fn a_lamp_that_moves_lights_everything_anew() {
     let moved = LAMP + Vec3::new(0.5, 0.0, 0.3);
-    let report = changed(rooms(LAMP, &[IN_THE_DARK]), || rooms(moved, &[IN_THE_DARK]));
+    let report = rebake(rooms(LAMP, &[IN_THE_DARK]), || rooms(moved, &[IN_THE_DARK]));
     assert!(share(&report, |r| r.relit) > 0.999, "{:?}", report.rebake);
 }
 
@@ -222,7 +222,7 @@ fn an_unchanged_scene_keeps_everything() {
     assert_eq!((rebake.relit, rebake.gathered, rebake.neglected), (0, 0, 0.0), "{rebake:?}");
     let (mut first, mut again) = (first, again);
     assert!(texels(&mut first).0 == texels(&mut again).0, "the same bits");
-    // After a bake that kept a part, too.
+    // The same holds after a bake that reused a part of the samples.
     let moved = || rooms(LAMP, &[(IN_THE_DARK.0 + Vec3::X * 0.3, RED)]);
     let (mut second, _, samples) = baked(moved(), Some(&samples), &options());
     let (mut again, report, _) = baked(moved(), Some(&samples), &options());
@@ -231,7 +231,7 @@ fn an_unchanged_scene_keeps_everything() {
 }
 
 #[test]
-fn a_world_is_baked_again_and_again_as_it_is() {
+fn a_baked_world_can_be_baked_again_repeatedly() {
     let options = options();
     let before = lumbre_bake::content_hash(&mut rooms(LAMP, &[IN_THE_DARK]), &options).unwrap();
     let (mut world, first, samples) = baked(rooms(LAMP, &[IN_THE_DARK]), None, &options);
@@ -254,7 +254,7 @@ fn a_world_is_baked_again_and_again_as_it_is() {
     let rebake = report.rebake.as_ref().unwrap();
     assert_eq!(rebake.changed, ["crate 0 (changed)".to_owned()], "{rebake}");
     assert!(rebake.gathered < rebake.texels, "{rebake}");
-    // Its mesh is exchanged for another; then the one that a bake has made is changed where it is.
+    // Its mesh is replaced by another one; then the mesh that a bake has made from that is modified in place.
     world.get_mut::<Mesh>(moved).unwrap().0 = Arc::new(shapes::cuboid(Vec3::new(0.5, 0.7, 0.5), 1));
     let (mut world, report, samples) = baked(world, Some(&samples), &options);
     assert_eq!(report.rebake.unwrap().changed, ["crate 0 (changed)".to_owned()]);
@@ -265,7 +265,7 @@ fn a_world_is_baked_again_and_again_as_it_is() {
 
 #[test]
 #[ignore = "slow: scripts/test --all runs it"]
-fn small_steps_add_up_to_no_more_than_is_stated() {
+fn the_errors_of_many_small_steps_stay_within_the_stated_error() {
     let at = |step: i32| (IN_THE_DARK.0 + Vec3::new(0.1 * step as f32, 0.0, 0.0), RED);
     let (_, _, mut samples) = baked(rooms(LAMP, &[at(0)]), None, &options());
     let mut last = None;
@@ -277,7 +277,7 @@ fn small_steps_add_up_to_no_more_than_is_stated() {
     }
     let (world, report) = last.expect("there were steps");
     let (whole, of_whole, _) = baked(rooms(LAMP, &[at(5)]), None, &options());
-    let (difference, within) = apart(world, whole);
+    let (difference, within) = difference(world, whole);
     assert!(difference <= report.estimated_error.hypot(of_whole.estimated_error), "{difference}");
     assert!(within >= 0.95, "{within}");
 }
@@ -316,11 +316,11 @@ fn the_same_bits_on_any_number_of_threads_from_a_file_and_after_an_interruption(
         .former(&read)
         .checkpoint(&checkpoint(true))
         .run_keeping_samples(&mut world)
-        .expect("it goes on");
+        .expect("the bake resumes");
     assert!(report.resumed_seconds > 0.0);
     assert_eq!(report.warnings, Vec::<String>::new());
     assert!(texels(&mut world).0 == expected, "the interruption leaves the bits as they are");
-    // The same scene, to be baked whole, is another bake.
+    // A full bake of the same scene does not resume from the checkpoint of a rebake.
     let (report, _) = Bake::new(&options())
         .checkpoint(&checkpoint(true))
         .run_keeping_samples(&mut rooms(LAMP, &[moved]))
@@ -329,7 +329,7 @@ fn the_same_bits_on_any_number_of_threads_from_a_file_and_after_an_interruption(
 }
 
 #[test]
-fn what_cannot_be_kept_is_said_and_baked() {
+fn samples_that_cannot_be_reused_lead_to_a_full_bake_with_a_reason() {
     let (_, _, samples) = baked(rooms(LAMP, &[IN_THE_DARK]), None, &options());
     let other = BakeOptions { error: 0.03, ..options() };
     let (again, report, _) = baked(rooms(LAMP, &[IN_THE_DARK]), Some(&samples), &other);

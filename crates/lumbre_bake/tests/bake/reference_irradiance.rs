@@ -1,12 +1,13 @@
-//! Whole bakes against converged irradiance from an independent path tracer, looked up bilinearly in the map.
-//! The points and scenes are measured data beside the checkout; without them the tests say so and compare nothing.
+//! Whole bakes against converged irradiance from an independent path tracer, by bilinear look-up in the maps. The
+//! points and scenes are measured data beside the checkout; without them the tests print a message and compare nothing.
 
 use crate::common;
 use bevy_ecs::world::World;
 use lumbre_bake::{Bake, BakeOptions, Density};
 
-/// Median, 95th percentile, RMSE and bias, relative to the mean irradiance. Measured at these sizes and this error asked
-/// for: 0.7, 3.5, 2.6, -0.2 % and 0.6, 3.2, 1.6, 0.2 %; another seed moves them by a tenth of that.
+/// Upper bounds on the median, the 95th percentile, the RMSE and the bias, relative to the mean irradiance. The
+/// measured values with these densities and this target error are 0.7, 3.5, 2.6, -0.2 % and 0.6, 3.2, 1.6, 0.2 %;
+/// another seed changes them by a tenth of that.
 const BOUNDS_CORNELL: [f64; 4] = [0.012, 0.05, 0.035, 0.004];
 const BOUNDS_ALCOVE: [f64; 4] = [0.012, 0.06, 0.03, 0.006];
 
@@ -45,8 +46,8 @@ fn alcove() {
     let found = bake_and_compare("conformance/bake/alcove.glb", "conformance/bake/alcove.csv", &options);
     let Some(found) = found else { return };
     assert_eq!(found.missed, 0);
-    // The board is a sheet of two faces in one place. In the reference its wall side reflects next to nothing: 0.1 of the
-    // mean on a dozen points.
+    // The board is a sheet of two coincident faces. In the reference the side that faces the wall reflects next to
+    // nothing, which makes a difference of 0.1 of the mean at a dozen points.
     assert!(found.median < BOUNDS_ALCOVE[0] && found.p95 < BOUNDS_ALCOVE[1], "{found}");
     assert!(found.rmse < BOUNDS_ALCOVE[2] && found.bias.abs() < BOUNDS_ALCOVE[3], "{found}");
 }

@@ -1,15 +1,16 @@
-//! The error that the map's resolution leaves, as the bake estimates it, against closed forms.
+//! The bake's estimate of the error due to the map's resolution, against closed forms.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::common;
-use crate::scene_parts::{grey, run};
+use crate::common::shapes::room;
+use crate::scene_parts::{black_sheet, grey, run};
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, Density, Quality};
-use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material};
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{Mesh, Name, StaticObject, Transform};
 
 /// A rectangle that looks up.
@@ -21,24 +22,24 @@ fn plane(x: [f32; 2], y: f32, z: [f32; 2]) -> Mesh {
 
 const LIGHT: DVec3 = DVec3::new(0.3, 2.0, -0.2);
 const HALF: f64 = 2.0;
-/// The board reaches from x = -2 to here, at this height: its shadow's edge is a line x = constant on the floor.
+/// A board at this height extends from x = -2 to this x: the edge of its shadow on the floor is a line x = constant.
 const EDGE: f64 = 0.1;
 const HEIGHT: f64 = 0.5;
 
-/// A black floor under a point light, with a board over a part of it.
-fn shadow() -> World {
+/// A black floor under a point light, with a board above a part of it.
+fn scene_with_shadow() -> World {
     let mut world = World::new();
     let half = HALF as f32;
     let name = |name: &str| Name::new(name.to_owned());
     world.spawn((name("floor"), plane([-half, half], 0.0, [-half, half]), grey(0.0, 0.0), StaticObject));
     let board = plane([-half, EDGE as f32], HEIGHT as f32, [-half, half]);
-    world.spawn((name("board"), board, Material { double_sided: true, ..grey(0.0, 0.0) }, StaticObject));
+    world.spawn((name("board"), board, black_sheet(), StaticObject));
     let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
     world.spawn((light, Transform::from_xyz(LIGHT.x, LIGHT.y, LIGHT.z)));
     world
 }
 
-/// Irradiance at points spread evenly over floor and board by the golden ratio's lattice.
+/// The irradiance at points that a golden-ratio lattice distributes evenly over floor and board.
 fn reference(count: u32) -> Vec<common::ReferencePoint> {
     let board = (EDGE + HALF) / (2.0 * HALF);
     let boards = (f64::from(count) * board) as u32;
@@ -51,7 +52,7 @@ fn reference(count: u32) -> Vec<common::ReferencePoint> {
     };
     let lit = |position: DVec3| {
         let towards = LIGHT - position;
-        // Where the way to the light passes the board's height.
+        // The point at which the segment to the light passes the board's height.
         let at = position + towards * ((HEIGHT - position.y) / towards.y);
         let hidden = position.y < HEIGHT && at.x < EDGE && at.x > -HALF && at.z.abs() < HALF;
         let light = if hidden { 0.0 } else { PI * towards.y / towards.length().powi(3) };
@@ -61,25 +62,30 @@ fn reference(count: u32) -> Vec<common::ReferencePoint> {
 }
 
 #[test]
-fn a_sharp_shadow_is_judged_as_it_is_and_better_in_denser_maps() {
+fn the_resolution_error_of_a_sharp_shadow_is_right_and_decreases_with_density() {
     let points = reference(40_000);
     let mut found = Vec::new();
     for side in [32, 128] {
-        let mut world = shadow();
+        let mut world = scene_with_shadow();
         let report =
             run(&mut world, &BakeOptions { density: Density::MapSize(side), ..BakeOptions::default() });
         let truth = common::compare(&mut world, &points);
         assert_eq!(truth.missed, 0);
         println!("{side}: {:?}, {truth}", report.resolution);
-        let apart = (report.resolution.error - truth.rmse).abs();
-        assert!(apart < 4.0 * report.resolution.standard_error, "{side}: {:?}, {truth}", report.resolution);
-        // Of the 1638 points some twenty lie on the finer map's edge.
+        let difference = (report.resolution.error - truth.rmse).abs();
+        assert!(
+            difference < 4.0 * report.resolution.standard_error,
+            "{side}: {:?}, {truth}",
+            report.resolution
+        );
+        // Of the 1638 points that are sampled, some twenty lie at the shadow's edge in the finer map.
         assert!(report.resolution.standard_error < 0.35 * truth.rmse, "{:?}", report.resolution);
-        // What sampling leaves is another number, and small here.
+        // The error of sampling is reported separately, and is small here.
         assert!(report.estimated_error < 0.5 * report.resolution.error);
         found.push((report.resolution, truth.rmse));
     }
-    // The edge's error does not shrink, the area where it shows does: the root of the texel's size, but for where the edge lies in a texel.
+    // The error at the edge does not shrink, but the area where it occurs does, so that the RMSE goes with the root of
+    // the texel's size, apart from the edge's position within a texel.
     let (coarse, fine) = (found[0], found[1]);
     assert!((coarse.1 / fine.1 / 2.0 - 1.0).abs() < 0.25, "{found:?}");
     let ratio = coarse.0.error / fine.0.error;
@@ -89,11 +95,9 @@ fn a_sharp_shadow_is_judged_as_it_is_and_better_in_denser_maps() {
 }
 
 #[test]
-fn nothing_is_lost_where_light_is_the_same_everywhere() {
+fn uniform_light_has_no_resolution_error() {
     let mut world = World::new();
-    let mut mesh = shapes::cuboid(Vec3::new(2.0, 1.0, 1.5), 1);
-    mesh.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
-    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    let mesh = room(Vec3::new(2.0, 1.0, 1.5));
     world.spawn((Mesh(Arc::new(mesh)), grey(0.6, 1.0), StaticObject));
     let options =
         BakeOptions { density: Density::MapSize(32), quality: Quality::Draft, ..BakeOptions::default() };
@@ -104,11 +108,11 @@ fn nothing_is_lost_where_light_is_the_same_everywhere() {
 }
 
 #[test]
-fn it_can_be_left_out_and_costs_little() {
+fn the_estimate_can_be_switched_off_and_costs_little() {
     let options = BakeOptions { density: Density::MapSize(64), ..BakeOptions::default() };
     let (with, without) = (
-        run(&mut shadow(), &options),
-        run(&mut shadow(), &BakeOptions { resolution_error: false, ..options }),
+        run(&mut scene_with_shadow(), &options),
+        run(&mut scene_with_shadow(), &BakeOptions { resolution_error: false, ..options }),
     );
     assert_eq!(without.resolution.points, 0);
     assert!(
@@ -117,6 +121,6 @@ fn it_can_be_left_out_and_costs_little() {
         without.skipped
     );
     assert_ne!(with.resolution.points, 0);
-    // A twentieth, or what the fewest points take.
+    // It takes about a twentieth of the rays, or those of the smallest number of points.
     assert!(with.rays - without.rays <= (without.rays / 15).max(1 << 17), "{} {}", with.rays, without.rays);
 }

@@ -1,4 +1,5 @@
-//! Seams: both sides of a smooth border show the same light, corners and walls stay apart, and nothing else moves.
+//! Seams: both sides of a smooth border between charts show the same light, while corners, walls and all other texels
+//! remain unchanged.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -14,7 +15,7 @@ use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
-/// A rectangle of the floor that looks up, with a rectangle of the map.
+/// Adds a rectangle of the floor that looks up and covers a rectangle of the map.
 fn add_quad(mesh: &mut TriangleMesh, x: [f32; 2], z: [f32; 2], u: [f32; 2], v: [f32; 2]) {
     let base = mesh.positions.len() as u32;
     for [i, k] in [[0, 0], [1, 0], [1, 1], [0, 1]] {
@@ -24,7 +25,7 @@ fn add_quad(mesh: &mut TriangleMesh, x: [f32; 2], z: [f32; 2], u: [f32; 2], v: [
     mesh.indices.extend([0, 2, 1, 0, 3, 2].map(|index| base + index));
 }
 
-/// A floor of 4 by 2 metres, cut at x = 0: 34 by 34 texels a side on the left, 10 by 10 on the right.
+/// A floor of 4 by 2 m that is cut at x = 0: the left chart has 34 by 34 texels, the right one 10 by 10.
 fn cut_floor() -> Mesh {
     let mut mesh = TriangleMesh::default();
     let texel = |from: f32, to: f32| [from / 48.0, to / 48.0];
@@ -33,11 +34,12 @@ fn cut_floor() -> Mesh {
     Mesh(Arc::new(mesh))
 }
 
-fn side_of_48() -> BakeOptions {
+fn draft_of_48_texels() -> BakeOptions {
     BakeOptions { density: Density::MapSize(48), quality: Quality::Draft, ..BakeOptions::default() }
 }
 
-/// Irradiance that some triangles of an entity show at a point: an independent look-up.
+/// The irradiance that a range of an entity's triangles shows at a point, by a look-up that is independent of the
+/// baker.
 fn read(world: &World, entity: Entity, triangles: Range<usize>, point: DVec3) -> Option<f64> {
     let mesh = &world.get::<Mesh>(entity)?.0;
     let map = &world.get::<Lightmap>(entity)?.image;
@@ -49,8 +51,8 @@ fn read(world: &World, entity: Entity, triangles: Range<usize>, point: DVec3) ->
             d.cross(c - a).dot(normal) / normal.length_squared(),
             (b - a).cross(d).dot(normal) / normal.length_squared(),
         );
-        let off = d.dot(normal.normalize()).abs();
-        if u > -1e-6 && v > -1e-6 && u + v < 1.0 + 1e-6 && off < 1e-5 {
+        let distance = d.dot(normal.normalize()).abs();
+        if u > -1e-6 && v > -1e-6 && u + v < 1.0 + 1e-6 && distance < 1e-5 {
             let [ta, tb, tc] = triangle.map(|v| mesh.uv1[v as usize].as_dvec2());
             return Some(common::bilinear(map, ta + (tb - ta) * u + (tc - ta) * v).x * PI);
         }
@@ -58,13 +60,13 @@ fn read(world: &World, entity: Entity, triangles: Range<usize>, point: DVec3) ->
     None
 }
 
-/// RMS of the differences of two sides at points, over their mean.
+/// The RMS difference between the two sides of a border, relative to their mean.
 fn jump(pairs: &[(f64, f64)]) -> f64 {
     let mean = pairs.iter().map(|(a, b)| 0.5 * (a + b)).sum::<f64>() / pairs.len() as f64;
     (pairs.iter().map(|(a, b)| (a - b).powi(2)).sum::<f64>() / pairs.len() as f64).sqrt() / mean
 }
 
-/// Points of the border x = 0.
+/// Points of the border x = 0 of the floor.
 fn border() -> impl Iterator<Item = DVec3> {
     (0..400).map(|i| DVec3::new(0.0, 0.0, (f64::from(i) + 0.5) / 200.0 - 1.0))
 }
@@ -76,18 +78,18 @@ fn charts_of_different_density_meet() {
         let floor = world.spawn((cut_floor(), grey(0.0, 0.0), StaticObject)).id();
         let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
         world.spawn((light, Transform::from_xyz(0.1, 0.35, 0.2)));
-        let report = run(&mut world, &BakeOptions { seams, ..side_of_48() });
+        let report = run(&mut world, &BakeOptions { seams, ..draft_of_48_texels() });
         let pairs: Vec<_> = border()
             .map(|p| (read(&world, floor, 0..2, p).unwrap(), read(&world, floor, 2..4, p).unwrap()))
             .collect();
         // E = π L_d cos θ / d².
         let light = DVec3::new(0.1, 0.35, 0.2);
         let exact = |p: DVec3| PI * light.y / (light - p).length().powi(3);
-        let off: f64 = border()
+        let squares: f64 = border()
             .zip(&pairs)
             .map(|(p, (a, b))| (a - exact(p)).powi(2) + (b - exact(p)).powi(2))
             .sum::<f64>();
-        (report, jump(&pairs), (off / 800.0).sqrt())
+        (report, jump(&pairs), (squares / 800.0).sqrt())
     });
     let [(without, open, off_before), (with, closed, off_after)] = &baked;
     println!("jump {open:.4} -> {closed:.4}, off {off_before:.4} -> {off_after:.4}; {:?}", with.seams);
@@ -96,13 +98,13 @@ fn charts_of_different_density_meet() {
     );
     assert_eq!(with.seams.edges, 1);
     assert!(*open > 0.05 && *closed < 0.2 * open, "{open} {closed}");
-    // The coarse side learns from the fine one: the two together are nearer to the truth.
+    // The coarse side adapts to the fine one, so that the two together are nearer to the truth.
     assert!(off_after < off_before, "{off_before} {off_after}");
     assert!(with.seams.jump_after < 0.2 * with.seams.jump_before, "{:?}", with.seams);
 }
 
 #[test]
-fn a_sphere_of_many_charts_has_no_seams() {
+fn the_seams_of_a_sphere_of_many_charts_are_closed() {
     let baked = [false, true].map(|seams| {
         let mut world = World::new();
         let ball = Mesh(Arc::new(shapes::tetrahedral_sphere(0.5, 4, false)));
@@ -111,7 +113,7 @@ fn a_sphere_of_many_charts_has_no_seams() {
         lamp.uv1.clear();
         let above = Transform::from_xyz(0.3, 1.2, 0.1);
         world.spawn((Name::new("lamp"), Mesh(Arc::new(lamp)), grey(0.5, 3.0), StaticObject, above));
-        let report = run(&mut world, &BakeOptions { seams, ..side_of_48() });
+        let report = run(&mut world, &BakeOptions { seams, ..draft_of_48_texels() });
         let errors = world.get::<TexelErrors>(ball).unwrap().0.clone();
         (report, common::maps(&mut world), errors)
     });
@@ -119,12 +121,13 @@ fn a_sphere_of_many_charts_has_no_seams() {
     println!("{:?}", report.seams);
     assert!(report.seams.edges > 20, "{:?}", report.seams);
     assert!(report.seams.jump_after < 0.3 * report.seams.jump_before, "{:?}", report.seams);
-    // The lamp's edges are real corners: not a bit of it moves.
+    // The lamp's edges are real corners, so that none of its texels changes.
     let map = |maps: &[(String, Arc<lumbre_scene::LightmapImage>)], name: &str| {
-        maps.iter().find(|(own, _)| own.starts_with(name)).expect("it was baked").1.texels.clone()
+        maps.iter().find(|(map_name, _)| map_name.starts_with(name)).expect("it was baked").1.texels.clone()
     };
     assert_eq!(map(before, "lamp"), map(after, "lamp"));
-    // What is moved states by how much, beside what it stated before; all else states the same.
+    // The stated error of a changed texel is the previous one and the change, added by their squares; that of all
+    // others remains the same.
     let mut moved = 0;
     for ((before, after), (stated, now)) in
         map(before, "ball").iter().zip(map(after, "ball")).zip(stated_before.iter().zip(&**stated_after))
@@ -132,7 +135,7 @@ fn a_sphere_of_many_charts_has_no_seams() {
         let squared = f64::from((after - *before).length_squared()) / 3.0;
         let expected = (f64::from(*stated).powi(2) + squared).sqrt();
         assert_eq!(stated.is_nan(), now.is_nan());
-        // A move is the difference of two numbers that are rounded themselves.
+        // The change is the difference of two numbers that are rounded themselves.
         let rounding = f64::from(before.max_element().max(after.max_element())) * 0.5f64.powi(23);
         let within = 1e-6 * expected + 2.0 * rounding;
         assert!(stated.is_nan() || (f64::from(*now) - expected).abs() < within, "{now} {expected}");
@@ -142,8 +145,8 @@ fn a_sphere_of_many_charts_has_no_seams() {
 }
 
 #[test]
-fn abutting_objects_of_their_own_maps_meet() {
-    // A long tile, and two short ones along its side: T-junctions.
+fn seams_between_abutting_objects_are_closed() {
+    // A long tile and two short ones along its side, which make T-junctions.
     let tile = |x: [f32; 2], z: [f32; 2]| {
         let mut mesh = TriangleMesh::default();
         add_quad(&mut mesh, x, z, [0.0, 1.0], [0.0, 1.0]);
@@ -158,7 +161,7 @@ fn abutting_objects_of_their_own_maps_meet() {
         let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
         world.spawn((light, Transform::from_xyz(-0.1, 0.2, 0.1)));
         let density = Density::TexelsPerMeter(9.0);
-        let report = run(&mut world, &BakeOptions { seams, density, ..side_of_48() });
+        let report = run(&mut world, &BakeOptions { seams, density, ..draft_of_48_texels() });
         let pairs: Vec<_> = border()
             .map(|p| {
                 let other = short.iter().find_map(|&tile| read(&world, tile, 0..2, p));
@@ -168,26 +171,24 @@ fn abutting_objects_of_their_own_maps_meet() {
         (report, jump(&pairs))
     });
     println!("{} -> {}; {:?}", baked[0].1, baked[1].1, baked[1].0.seams);
-    // The long one with each short one, and these with each other.
+    // The long tile has a seam with each short one, and these have one with each other.
     assert_eq!(baked[1].0.seams.edges, 3);
     assert!(baked[0].1 > 0.02 && baked[1].1 < 0.25 * baked[0].1, "{} {}", baked[0].1, baked[1].1);
 }
 
 #[test]
 fn a_corner_is_not_a_seam() {
-    let mut room = shapes::cuboid(Vec3::splat(2.0), 1);
-    room.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
-    room.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    let room = common::shapes::room(Vec3::splat(2.0));
     let mut world = World::new();
     world.spawn((Mesh(Arc::new(room)), grey(0.5, 0.0), StaticObject));
     let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
     world.spawn((light, Transform::from_xyz(0.5, 0.5, 0.2)));
-    let report = run(&mut world, &side_of_48());
+    let report = run(&mut world, &draft_of_48_texels());
     assert_eq!(report.seams, lumbre_bake::SeamReport::default());
     assert!(report.skipped.iter().any(|line| line.contains("seams: no two borders")), "{:?}", report.skipped);
 }
 
-/// The cut floor, a wall that stands on the cut, and light on one side only.
+/// A wall stands on the floor's cut, with a light on one side only.
 #[test]
 fn a_wall_on_the_seam_keeps_the_sides_apart() {
     let mut world = World::new();
@@ -203,7 +204,7 @@ fn a_wall_on_the_seam_keeps_the_sides_apart() {
     world.spawn((Mesh(Arc::new(wall)), wall_material, StaticObject));
     let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
     world.spawn((light, Transform::from_xyz(-0.5, 0.5, 0.1)));
-    let report = run(&mut world, &side_of_48());
+    let report = run(&mut world, &draft_of_48_texels());
     assert_eq!(report.seams.edges, 0);
     for point in border() {
         assert!(read(&world, floor, 0..2, point).unwrap() > 0.1);
@@ -213,7 +214,7 @@ fn a_wall_on_the_seam_keeps_the_sides_apart() {
 
 #[test]
 fn a_sharp_shadow_across_the_seam_stays_sharp() {
-    // A roof over z < 0.05; light straight from above: E = 1 beside it, 0 under it.
+    // A roof covers z < 0.05 under light from straight above: E = 1 beside it and 0 under it.
     let baked = [false, true].map(|seams| {
         let mut world = World::new();
         let floor = world.spawn((cut_floor(), grey(0.0, 0.0), StaticObject)).id();
@@ -222,34 +223,36 @@ fn a_sharp_shadow_across_the_seam_stays_sharp() {
         world.spawn((Mesh(Arc::new(roof)), grey(0.0, 0.0), StaticObject, Transform::from_xyz(0.0, 1.0, 0.0)));
         let sun = Light { bake: BakeMode::Static, ..Light::directional(Vec3::splat(1.0 / PI as f32)) };
         world.spawn((sun, Transform::from_xyz(0.0, 5.0, 0.0).looking_at(DVec3::ZERO, DVec3::X)));
-        let report = run(&mut world, &side_of_48());
-        let report = if seams { report } else { run(&mut world, &BakeOptions { seams, ..side_of_48() }) };
+        let report = run(&mut world, &draft_of_48_texels());
+        let report =
+            if seams { report } else { run(&mut world, &BakeOptions { seams, ..draft_of_48_texels() }) };
         let image = world.get::<Lightmap>(floor).unwrap().image.clone();
         let errors = world.get::<TexelErrors>(floor).unwrap().0.clone();
         let exact = |p: DVec3| f64::from(u8::from(p.z > 0.05));
-        let off = border()
+        let mean_error = border()
             .map(|p| {
                 let sides = [0..2, 2..4].map(|t| (read(&world, floor, t, p).unwrap() - exact(p)).abs());
                 sides[0] + sides[1]
             })
             .sum::<f64>()
             / 800.0;
-        (report, image, errors, off)
+        (report, image, errors, mean_error)
     });
     let [(_, before, errors, off_before), (report, after, _, off_after)] = &baked;
     println!("off {off_before:.4} -> {off_after:.4}; {:?}", report.seams);
     assert_eq!(report.seams.edges, 1);
     assert!(report.seams.jump_after <= report.seams.jump_before);
-    // No blurring: what the two sides show is as near to the step as it was.
+    // Closing the seam does not blur: the two sides are as near to the step as before.
     assert!(*off_after <= off_before * 1.05, "{off_before} {off_after}");
     for (index, (a, b)) in before.texels.iter().zip(&after.texels).enumerate() {
         let (x, y) = (index % 48, index / 48);
-        // The border's column, half outside, is continued from two texels around.
-        // Left: columns 32 and 33 reach the border, and the step lies in row 17.8; right: columns 36 and 37, row 5.2.
+        // Only texels near the step at the border may change. In the left chart, columns 32 and 33 reach the border and
+        // the step lies in row 17.8; in the right one, columns 36 and 37 and row 5.2. The border's column is half
+        // outside of its chart and is extrapolated from up to two texels around.
         let near = ((32..35).contains(&x) && (15..=20).contains(&y))
             || ((36..38).contains(&x) && (3..=7).contains(&y));
         let moved = f64::from((*a - *b).abs().max_element()) * PI;
-        // Full light differs from texel to texel by the rounding of its sums, and may move by as much.
+        // Texels in full light differ by the rounding of their sums and may change by as much.
         assert!(near || moved < 1e-5, "({x}, {y}) moved by {moved}, stated error {}", errors[index]);
     }
 }
@@ -272,7 +275,7 @@ fn scene(scale: f32) -> World {
 
 #[test]
 fn the_same_bits_on_any_threads_and_at_any_scale_of_two() {
-    let options = side_of_48();
+    let options = draft_of_48_texels();
     let baked: Vec<_> = [(1.0, 1), (1.0, 2), (1.0, 8), (1.0 / 128.0, 2), (1024.0, 2)]
         .map(|(scale, threads)| {
             let mut world = scene(scale);

@@ -1,7 +1,9 @@
-//! Direct and bounced light as maps of their own: they add up to the map, and each is what a scene with nothing but that light has.
+//! Direct and bounced light in separate maps: they must add up to the whole map, and each must equal the light of a
+//! scene with only that light.
 
 use std::sync::Arc;
 
+use crate::common::shapes::room;
 use glam::{DAffine3, DVec3, Vec3};
 use lumbre_bake::{
     Bake, BakeOptions, BakedScene, Density, PlacedLight, PlacedPrimitive, Quality, SceneObject, StaticScene,
@@ -18,15 +20,7 @@ fn options() -> BakeOptions {
     }
 }
 
-/// The inside of a box of this size.
-fn room(size: Vec3) -> TriangleMesh {
-    let mut mesh = shapes::cuboid(size, 1);
-    mesh.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
-    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-    mesh
-}
-
-/// A room of this reflectance with a box on its floor, a lamp of this mode, and a panel that shines.
+/// A room of this reflectance with a box on its floor, a point light of this mode, and an emissive panel.
 fn scene(reflectance: f32, mode: BakeMode) -> StaticScene {
     let matt = |reflectance: f32| {
         let front = Surface { diffuse: Vec3::new(1.0, 0.8, 0.6) * reflectance, ..Surface::default() };
@@ -62,11 +56,11 @@ fn bake(scene: StaticScene, options: BakeOptions) -> BakedScene {
 }
 
 #[test]
-fn both_maps_add_up_to_the_map_and_leave_it_as_it_is() {
+fn both_maps_add_up_to_the_whole_map_and_do_not_change_it() {
     for atlas_size in [None, Some(256)] {
-        let asked = BakeOptions { atlas_size, ..options() };
-        let whole = bake(scene(0.6, BakeMode::Static), BakeOptions { separate_light: false, ..asked });
-        let baked = bake(scene(0.6, BakeMode::Static), asked);
+        let options = BakeOptions { atlas_size, ..options() };
+        let whole = bake(scene(0.6, BakeMode::Static), BakeOptions { separate_light: false, ..options });
+        let baked = bake(scene(0.6, BakeMode::Static), options);
         let (mut direct_sum, mut bounced_sum) = (0.0, 0.0);
         for (plain, map) in whole.maps.iter().zip(&baked.maps) {
             assert_eq!(plain.image, map.image, "asking for both does not change the map");
@@ -75,8 +69,11 @@ fn both_maps_add_up_to_the_map_and_leave_it_as_it_is() {
             let both = separate.direct.texels.iter().zip(&separate.bounced.texels);
             for (&texel, (&direct, &bounced)) in map.image.texels.iter().zip(both) {
                 assert!(direct.min_element() >= 0.0 && bounced.min_element() >= 0.0, "{direct} {bounced}");
-                let apart = (direct + bounced - texel).abs().max_element();
-                assert!(apart <= 2.0 * f32::EPSILON * texel.max_element(), "{texel}: {direct} + {bounced}");
+                let difference = (direct + bounced - texel).abs().max_element();
+                assert!(
+                    difference <= 2.0 * f32::EPSILON * texel.max_element(),
+                    "{texel}: {direct} + {bounced}"
+                );
                 direct_sum += direct.element_sum();
                 bounced_sum += bounced.element_sum();
             }
@@ -86,13 +83,13 @@ fn both_maps_add_up_to_the_map_and_leave_it_as_it_is() {
             .maps
             .iter()
             .filter_map(|map| map.separate.as_ref())
-            .map(|own| own.direct.name.as_str())
+            .map(|separate| separate.direct.name.as_str())
             .collect();
         assert!(names[0].ends_with(".direct.lightmap.exr"), "{names:?}");
     }
 }
 
-/// The direct light of a room is all the light of the same room with black walls.
+/// The direct light of a room equals the entire light of the same room with black walls.
 #[test]
 fn direct_light_is_that_of_black_walls() {
     let baked = bake(scene(0.6, BakeMode::Static), options());
@@ -116,21 +113,21 @@ fn direct_light_is_that_of_black_walls() {
         "direct light beside that of black walls: {:.3} % of its mean over {texels} texels",
         100.0 * error
     );
-    // Both have the same samples; what differs is what closing seams has done to the whole.
+    // Both use the same samples; they differ only in how closing the seams has changed the whole maps.
     assert!(texels > 1000.0 && error < 0.01, "{error}");
 }
 
-/// A mixed lamp lights frames directly: of it the maps hold the bounces only, and the direct map nothing.
+/// Frames light objects directly with a mixed light: the maps contain only its bounces, and the direct maps are black.
 #[test]
 fn a_mixed_lamp_has_no_direct_light_in_the_maps() {
     let mut mixed = scene(0.6, BakeMode::Mixed);
     mixed.objects.truncate(2);
     let baked = bake(mixed, options());
-    let separate = baked.maps.iter().filter_map(|map| map.separate.as_ref());
+    let separate_maps = baked.maps.iter().filter_map(|map| map.separate.as_ref());
     let mut bounced = 0.0;
-    for own in separate {
-        assert!(own.direct.texels.iter().all(|texel| *texel == Vec3::ZERO));
-        bounced += own.bounced.texels.iter().map(|texel| texel.element_sum()).sum::<f32>();
+    for separate in separate_maps {
+        assert!(separate.direct.texels.iter().all(|texel| *texel == Vec3::ZERO));
+        bounced += separate.bounced.texels.iter().map(|texel| texel.element_sum()).sum::<f32>();
     }
     assert!(bounced > 0.0);
 }

@@ -1,4 +1,4 @@
-//! Light of the sky: scenes whose irradiance is known in closed form.
+//! Light of the sky in scenes whose irradiance is known in closed form.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{Material, Surface};
+use lumbre_optics::Material;
 use lumbre_scene::{Mesh, SceneSettings, StaticObject};
 
 const SKY: Vec3 = Vec3::new(0.5, 1.0, 2.0);
@@ -23,13 +23,10 @@ fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
 }
 
 fn matt(reflectance: f32, emission: Vec3) -> Material {
-    Material {
-        front: Surface { diffuse: Vec3::splat(reflectance), emission, ..Surface::default() },
-        ..Material::default()
-    }
+    crate::scene_parts::matt(Vec3::splat(reflectance), emission)
 }
 
-/// A flat quadrilateral, seen from where its corners run counter-clockwise.
+/// A flat quadrilateral; its front is the side from which its corners run counter-clockwise.
 fn quad(corners: [[f32; 3]; 4]) -> Mesh {
     Mesh(Arc::new(TriangleMesh {
         positions: corners.map(Vec3::from).to_vec(),
@@ -42,7 +39,7 @@ fn floor(half: f32) -> Mesh {
     quad([[-half, 0.0, -half], [-half, 0.0, half], [half, 0.0, half], [half, 0.0, -half]])
 }
 
-/// Irradiance of every covered texel.
+/// The irradiance of all texels that are not black.
 fn irradiances(world: &mut World) -> Vec<DVec3> {
     let maps = common::maps(world);
     let all = maps.iter().flat_map(|(_, map)| map.texels.iter().map(|texel| texel.as_dvec3() * PI));
@@ -50,7 +47,7 @@ fn irradiances(world: &mut World) -> Vec<DVec3> {
 }
 
 #[test]
-fn what_sees_only_the_sky_has_pi_times_its_radiance() {
+fn surfaces_that_see_only_the_sky_have_pi_times_its_radiance() {
     for reflectance in [0.0, 0.8] {
         for mesh in [floor(1.0), Mesh(Arc::new(shapes::cuboid(Vec3::new(1.0, 2.0, 3.0), 1)))] {
             let mut world = World::new();
@@ -61,7 +58,7 @@ fn what_sees_only_the_sky_has_pi_times_its_radiance() {
             let found = irradiances(&mut world);
             assert!(found.len() > 100);
             for e in found {
-                // Nothing is sampled that varies: what is left is the rounding of sums in f32.
+                // The sampled radiance is constant: what remains is the rounding of sums in f32.
                 assert!((e / (PI * SKY.as_dvec3()) - 1.0).abs().max_element() < 1e-5, "{e}");
             }
         }
@@ -70,8 +67,8 @@ fn what_sees_only_the_sky_has_pi_times_its_radiance() {
 
 #[test]
 fn a_floor_before_a_wall() {
-    // A black wall of height h and half length a, at distance c from an element of the floor, hides of the sky what
-    // F = 1/π (atan(a/c) - c/√(c²+h²) atan(a/√(c²+h²))) is (two perpendicular rectangles as an element sees them).
+    // A black wall of height h and half length a, at distance c from an element of the floor, hides the share F = 1/π
+    // (atan(a/c) - c/√(c²+h²) atan(a/√(c²+h²))) of the sky (form factor from an element to a perpendicular rectangle).
     let (height, half) = (1.5, 2.0);
     let wall = quad([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0], [0.0, 1.5, -2.0], [0.0, 1.5, 2.0]]);
     let mut world = World::new();
@@ -95,19 +92,19 @@ fn a_floor_before_a_wall() {
         .collect();
     let found = common::compare(&mut world, &points);
     println!("{found}; stated {:.3} %", 100.0 * report.estimated_error);
-    // The error asked for.
+    // The target error is 1 %.
     assert!(found.missed == 0 && found.rmse < 0.01 && found.rmse < 2.0 * report.estimated_error, "{found}");
     assert!(found.bias.abs() < 0.005, "{found}");
 }
 
 #[test]
 fn the_floor_of_a_trench() {
-    // Between two walls without end, of height h and width w apart, black: at x from the middle the floor sees the sky between two
-    // angles from the vertical, E = π L (sin β + sin γ)/2 with tan β = (w/2 - x)/h and tan γ = (w/2 + x)/h.
-    // Walls of 100 h on either side leave out of the hidden part less than (h/100h)² of it.
+    // Between two infinite black walls of height h and distance w, a point of the floor at x from the middle sees the
+    // sky between two angles from the vertical: E = π L (sin β + sin γ)/2 with tan β = (w/2 - x)/h and tan γ = (w/2 +
+    // x)/h. Walls that end at 100 h on either side hide less by a share of (h/100h)² at most.
     let (h, w, long) = (1.0, 2.0, 100.0);
     let mut world = World::new();
-    // Only the middle of the floor: the rest would take the map.
+    // Only the middle of the floor is modelled; the rest would take up the map.
     world.spawn((floor(1.0), matt(0.9, Vec3::ZERO), StaticObject));
     for x in [-1.0, 1.0f32] {
         let z = 100.0 * x;
@@ -116,7 +113,8 @@ fn the_floor_of_a_trench() {
         black.double_sided = true;
         world.spawn((wall, black, StaticObject));
     }
-    // Nine points are few: their RMSE alone may be a third above that of all. Half a per cent is asked for one.
+    // The RMSE of as few as nine points may be a third above that of all texels. The target error is half of the limit
+    // of one per cent.
     let report = run(&mut world, &BakeOptions { error: 0.005, ..options(64, Quality::Final) });
     let points: Vec<_> = (0..9)
         .map(|i| {
@@ -135,8 +133,9 @@ fn the_floor_of_a_trench() {
 
 #[test]
 fn furnace_under_the_sky() {
-    // Surfaces of reflectance ρ that emit (1 - ρ) L under a sky of radiance L: whatever their form, every ray meets radiance L, so
-    // E = π L everywhere. Bounces, sky, emission and the texels' edges all have to agree.
+    // Surfaces of reflectance ρ that emit (1 - ρ) L under a sky of radiance L: whatever their shape, every ray finds
+    // the radiance L, so that E = π L everywhere. Bounces, sky, emission and the handling of texels at edges all have
+    // to agree.
     for reflectance in [0.3f32, 0.8] {
         let mut world = World::new();
         let material = matt(reflectance, (1.0 - reflectance) * SKY);
@@ -166,7 +165,7 @@ fn furnace_under_the_sky() {
 }
 
 #[test]
-fn no_sky_is_no_work_and_says_so() {
+fn without_a_sky_the_stage_is_skipped_with_a_message() {
     let mut world = World::new();
     world.spawn((floor(1.0), matt(0.5, Vec3::ONE), StaticObject));
     let report = Bake::new(&options(16, Quality::Draft)).run(&mut world).unwrap();

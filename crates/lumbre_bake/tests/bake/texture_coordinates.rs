@@ -1,4 +1,5 @@
-//! Textures that read TEXCOORD_1, which the lightmap needs: what moves, what stays and what is refused; through files, too.
+//! Textures that use TEXCOORD_1, which the lightmap needs: which coordinates are moved, which stay, and which scenes
+//! are refused; also after saving and loading.
 
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use lumbre_scene::{
     Transform,
 };
 
-/// A floor whose first coordinates are all in one place and whose second tile three times.
+/// A floor whose first set of coordinates is constant and whose second one repeats a texture three times.
 fn floor() -> Arc<TriangleMesh> {
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     Arc::new(TriangleMesh {
@@ -26,7 +27,7 @@ fn floor() -> Arc<TriangleMesh> {
     })
 }
 
-/// Black on the left half of each tile, white on the right.
+/// A texture whose left half is black and whose right half is white.
 fn stripes(tex_coord: u32) -> TextureReference {
     let row = [[0u8, 0, 0, 255], [255; 4]].concat();
     TextureReference {
@@ -58,7 +59,7 @@ fn run(world: &mut World) -> Result<BakeReport, BakeError> {
     Bake::new(&options).run(world)
 }
 
-/// Where the texture is read at each corner of each triangle.
+/// The texture coordinates at each corner of each triangle.
 fn texture_reading(world: &World, entity: Entity) -> Vec<Vec2> {
     let mesh = &world.get::<Mesh>(entity).expect("it was baked").0;
     let texture =

@@ -1,4 +1,5 @@
-//! A small scene with everything that is kept or counted: a lamp, a light, bounces, shadows. Not a known answer.
+//! A small scene that involves every stage of a bake: an emissive lamp, a point light, bounces, shadows. It has no
+//! closed form; tests compare bakes of it with each other.
 
 use std::sync::Arc;
 
@@ -20,9 +21,9 @@ pub fn corner() -> World {
     add("left", Vec3::new(0.2, 3.0, 4.0), [-2.1, 1.5, 0.0], Material::matt(Vec3::new(0.8, 0.2, 0.1)));
     add("back", Vec3::new(4.0, 3.0, 0.2), [0.0, 1.5, -2.1], Material::matt(Vec3::splat(0.75)));
     add("box", Vec3::new(0.8, 1.0, 0.8), [0.3, 0.5, -0.4], Material::matt(Vec3::new(0.2, 0.6, 0.3)));
-    let glow = Surface { emission: Vec3::new(9.0, 8.0, 6.0), ..Surface::default() };
-    let glow = Material { front: glow, ..Material::default() };
-    add("lamp", Vec3::new(0.6, 0.1, 0.6), [0.5, 2.8, 0.2], glow);
+    let front = Surface { emission: Vec3::new(9.0, 8.0, 6.0), ..Surface::default() };
+    let emissive = Material { front, ..Material::default() };
+    add("lamp", Vec3::new(0.6, 0.1, 0.6), [0.5, 2.8, 0.2], emissive);
     let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::splat(0.4)) };
     world.spawn((light, Transform::from_xyz(-1.0, 2.0, 1.0)));
     world

@@ -1,6 +1,9 @@
-//! Looks reference points up in a baked world and measures the error. Not a bake.
+//! Helpers of tests and examples: irradiance at reference points, read from the lightmaps of a baked world and compared
+//! with the expected one, and the bits of all maps. The bakes themselves are in the tests.
 
-#![allow(dead_code, reason = "every test and example uses its own part of this module")]
+#![allow(dead_code, reason = "each test and example uses only a part of this module")]
+
+pub mod shapes;
 
 use std::path::{Path, PathBuf};
 
@@ -8,18 +11,20 @@ use bevy_ecs::world::World;
 use glam::{DVec2, DVec3, Vec3};
 use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, Mesh};
 
-/// A folder of measured data beside the checkout; `None`, loudly, where it is missing.
+/// Returns the path of a file or folder of measured data beside the checkout, or `None`, with a message, if it is
+/// missing.
 pub fn shared(path: &str) -> Option<PathBuf> {
-    let found = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared")).join(path);
-    if found.exists() {
-        return Some(found);
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared")).join(path);
+    if path.exists() {
+        return Some(path);
     }
-    eprintln!("SKIPPED: {} is missing; nothing was compared", found.display());
+    eprintln!("SKIPPED: {} is missing; nothing was compared", path.display());
     None
 }
 
-/// Form factor from an element below to a square of a side in a parallel plane at a height, by its four corners (the element lies under the point
-/// (x, z) measured from the square's middle).
+/// The form factor from a horizontal surface element to a horizontal square `height` above it: the sum of the form
+/// factors of the four rectangles into which the vertical through the element cuts the square. The element lies at (x,
+/// z) relative to the square's centre.
 pub fn to_square(x: f64, z: f64, side: f64, height: f64) -> f64 {
     let corner = |a: f64, b: f64| {
         let (a, b) = (a / height, b / height);
@@ -30,7 +35,7 @@ pub fn to_square(x: f64, z: f64, side: f64, height: f64) -> f64 {
     corner(h - x, h - z) + corner(h + x, h - z) + corner(h - x, h + z) + corner(h + x, h + z)
 }
 
-/// A point of a surface and its converged irradiance, W/m²; NaN where a channel is unknown.
+/// A point on a surface with its converged irradiance in W/m²; a channel that is unknown is NaN.
 #[derive(Clone, Copy, Debug)]
 pub struct ReferencePoint {
     pub position: DVec3,
@@ -51,17 +56,22 @@ pub fn read_reference(path: &Path) -> Vec<ReferencePoint> {
     rows.collect()
 }
 
-/// Errors relative to the mean irradiance, all channels together.
+/// Statistics of the errors at reference points. The errors are relative to the mean irradiance of all points; each
+/// known channel of a point counts as one value.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
+    /// The number of points that lie on a lightmapped surface.
     pub points: usize,
+    /// The number of points that lie on none.
     pub missed: usize,
+    /// Mean expected irradiance, W/m².
     pub mean: f64,
     pub median: f64,
     pub p95: f64,
     pub rmse: f64,
     pub bias: f64,
-    /// The points of the largest errors: position, found, expected.
+    /// The twelve points with the largest errors, the worst first: position, irradiance in the map, expected
+    /// irradiance.
     pub worst: Vec<(DVec3, DVec3, DVec3)>,
 }
 
@@ -82,13 +92,13 @@ impl std::fmt::Display for Comparison {
     }
 }
 
-/// Looks every point up in the world's lightmaps, bilinearly.
+/// Compares the irradiance that the world's lightmaps show at the points, filtered bilinearly, with the expected one.
 pub fn compare(world: &mut World, points: &[ReferencePoint]) -> Comparison {
     let surfaces = lightmapped(world);
     let mut pairs = Vec::new();
     let (mut missed, mut sum, mut count) = (0, 0.0, 0.0);
     for point in points {
-        let Some(found) = look_up(&surfaces, point) else {
+        let Some(irradiance) = look_up(&surfaces, point) else {
             missed += 1;
             continue;
         };
@@ -98,25 +108,25 @@ pub fn compare(world: &mut World, points: &[ReferencePoint]) -> Comparison {
                 count += 1.0;
             }
         }
-        pairs.push((point.position, found, point.irradiance));
+        pairs.push((point.position, irradiance, point.irradiance));
     }
     let mean = sum / count;
     let mut errors = Vec::new();
     let mut bias = 0.0;
-    for (_, found, expected) in &pairs {
+    for (_, irradiance, expected) in &pairs {
         for channel in 0..3 {
             if expected[channel].is_finite() {
-                let error = (found[channel] - expected[channel]) / mean;
+                let error = (irradiance[channel] - expected[channel]) / mean;
                 errors.push(error.abs());
                 bias += error;
             }
         }
     }
     errors.sort_by(f64::total_cmp);
-    let error_of = |(_, found, expected): &(DVec3, DVec3, DVec3)| {
+    let error_of = |(_, irradiance, expected): &(DVec3, DVec3, DVec3)| {
         (0..3)
             .filter(|&c| expected[c].is_finite())
-            .map(|c| (found[c] - expected[c]).abs())
+            .map(|c| (irradiance[c] - expected[c]).abs())
             .fold(0.0, f64::max)
     };
     pairs.sort_by(|a, b| error_of(b).total_cmp(&error_of(a)));
@@ -133,7 +143,7 @@ pub fn compare(world: &mut World, points: &[ReferencePoint]) -> Comparison {
     }
 }
 
-/// World triangles with their lightmap coordinates.
+/// The triangles of an object in world space with their lightmap coordinates, and its lightmap.
 pub type Surface = (Vec<([DVec3; 3], [DVec2; 3])>, std::sync::Arc<LightmapImage>);
 
 pub fn lightmapped(world: &mut World) -> Vec<Surface> {
@@ -153,7 +163,7 @@ pub fn lightmapped(world: &mut World) -> Vec<Surface> {
     surfaces.collect()
 }
 
-/// Irradiance by the map at a point, bilinearly; `None` where no triangle passes through it.
+/// Returns the irradiance that the lightmaps show at a point, or `None` if no lightmapped triangle passes through it.
 pub fn look_up(surfaces: &[Surface], point: &ReferencePoint) -> Option<DVec3> {
     let mut best: Option<(f64, DVec3)> = None;
     for (triangles, image) in surfaces {
@@ -178,7 +188,7 @@ pub fn look_up(surfaces: &[Surface], point: &ReferencePoint) -> Option<DVec3> {
     best.map(|(_, value)| value * std::f64::consts::PI)
 }
 
-/// As a GPU samples it, clamped at the border.
+/// Samples a lightmap as a GPU does, with bilinear filtering and clamping at the border.
 pub fn bilinear(image: &LightmapImage, uv: DVec2) -> DVec3 {
     let at = uv * DVec2::new(f64::from(image.width), f64::from(image.height)) - 0.5;
     let low = at.floor();
@@ -193,17 +203,17 @@ pub fn bilinear(image: &LightmapImage, uv: DVec2) -> DVec3 {
     top.lerp(bottom, f.y)
 }
 
-/// Every texel of every map, by name.
+/// Returns the world's lightmaps, sorted by name. A map that several objects share is listed once.
 pub fn maps(world: &mut World) -> Vec<(String, std::sync::Arc<LightmapImage>)> {
     let mut query = world.query::<&Lightmap>();
-    let mut found: Vec<_> =
+    let mut maps: Vec<_> =
         query.iter(world).map(|lightmap| (lightmap.image.name.clone(), lightmap.image.clone())).collect();
-    found.sort_by(|a, b| a.0.cmp(&b.0));
-    found.dedup_by(|a, b| a.0 == b.0);
-    found
+    maps.sort_by(|a, b| a.0.cmp(&b.0));
+    maps.dedup_by(|a, b| a.0 == b.0);
+    maps
 }
 
-/// The bits of all maps.
+/// Returns the bits of all channels of all texels of all maps, so that two bakes can be compared exactly.
 pub fn bits(world: &mut World) -> Vec<u32> {
     let bits = |v: Vec3| v.to_array().map(f32::to_bits);
     maps(world).iter().flat_map(|(_, image)| image.texels.iter().flat_map(move |&t| bits(t))).collect()

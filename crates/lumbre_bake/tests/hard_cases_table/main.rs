@@ -1,5 +1,5 @@
-//! The hard cases of baking and ray casting, each with the value that it must give and the bound that it must keep.
-//! `cargo test -p lumbre_bake --test hard_cases_table -- --nocapture table` prints them all; each is a test of its own too.
+//! The hard cases of baking and ray casting, each with its expected value and the bound on the difference.
+//! `cargo test -p lumbre_bake --test hard_cases_table -- --nocapture table` prints all of them; each is also a test.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
@@ -26,21 +26,21 @@ use case::Case;
 use rows::ROWS;
 use table::Table;
 
-fn whole() -> Table {
+fn all_cases() -> Table {
     let cases: Vec<Case> = [rays::cases(), places::cases(), energy::cases(), maps::cases()].concat();
     Table::new("Hard cases of baking and ray casting", &ROWS, cases)
 }
 
-/// Runs all and prints the table. With LUMBRE_WRITE_TABLES=1 it becomes its part of docs/hard-cases.md too.
+/// Runs all cases and prints the table. With LUMBRE_WRITE_TABLES=1 it also rewrites its part of docs/hard-cases.md.
 #[test]
 fn table() {
     let command = "cargo test -p lumbre_bake --test hard_cases_table -- --nocapture table";
     let about = ". Where a case compares many values, the one farthest from its expectation is shown. What a row has elsewhere stands \
                  behind its links.";
-    whole().print(command, about);
+    all_cases().print(command, about);
 }
 
 #[test]
 fn the_page_lists_these_cases() {
-    whole().in_step();
+    all_cases().in_step();
 }

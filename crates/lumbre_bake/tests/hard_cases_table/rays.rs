@@ -1,4 +1,4 @@
-//! Rays that leave a face, and rays through edges.
+//! Cases about rays that leave a face, and rays through edges.
 
 use std::f64::consts::PI;
 
@@ -8,8 +8,9 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_rays::{Bvh, Ray, offset_ray_origin, triangle_extent};
 
 use crate::case::Outcome;
+use crate::common::shapes::square;
 use crate::random::{Random, cuboid, sphere};
-use crate::scenes::{different, draft, irradiance, matt, mean_of, run, spawn, square};
+use crate::scenes::{differing_values, draft, grey, irradiance, mean_of, run, spawn};
 
 crate::cases! {
     "a ray hits the face it left, scenes of 1e-3 to 1e5 m" {
@@ -24,7 +25,8 @@ crate::cases! {
     }
 }
 
-/// Rays that start on a convex closed surface and go out, down to a millionth above the face: how many hit it.
+/// Counts the rays that hit the convex closed surface on which they start, though they go outwards, down to a millionth
+/// above the face.
 fn hits_on_leaving(triangles: &[[Vec3; 3]], rays: usize) -> f64 {
     let bvh = Bvh::build(triangles);
     let mut random = Random(5);
@@ -33,12 +35,12 @@ fn hits_on_leaving(triangles: &[[Vec3; 3]], rays: usize) -> f64 {
         let (u, v) = random.barycentric();
         let [a, b, c] = *triangle;
         let position = a * (1.0 - u - v) + b * u + c * v;
-        let exact = (b.as_dvec3() - a.as_dvec3()).cross(c.as_dvec3() - a.as_dvec3()).normalize();
-        let origin = offset_ray_origin(position, exact.as_vec3(), triangle_extent(triangle));
-        let along = random.direction().as_dvec3().reject_from_normalized(exact).normalize_or(exact);
-        let direction = (along + exact * 10f64.powf(-6.0 * f64::from(random.unit()))).as_vec3();
-        // Rounded to f32, a grazing direction may point inward.
-        direction.as_dvec3().dot(exact) > 0.0 && bvh.any_hit(&Ray::new(origin, direction))
+        let normal = (b.as_dvec3() - a.as_dvec3()).cross(c.as_dvec3() - a.as_dvec3()).normalize();
+        let origin = offset_ray_origin(position, normal.as_vec3(), triangle_extent(triangle));
+        let tangent = random.direction().as_dvec3().reject_from_normalized(normal).normalize_or(normal);
+        let direction = (tangent + normal * 10f64.powf(-6.0 * f64::from(random.unit()))).as_vec3();
+        // A grazing direction that points inwards after rounding to f32 does not count.
+        direction.as_dvec3().dot(normal) > 0.0 && bvh.any_hit(&Ray::new(origin, direction))
     };
     (0..rays).filter(hit).count() as f64
 }
@@ -80,17 +82,18 @@ fn the_offset_is_ulps() -> Outcome {
     Outcome::worst(moved.collect::<Vec<_>>(), 2e-6, why)
 }
 
-/// The middle of a floor of a half side under a shining square of the same size as high above it.
+/// The irradiance at the centre of a square floor of half side `half` under an emissive square of the same size at a
+/// height of `half`.
 fn floor_of(half: f32) -> Outcome {
     let mut world = World::new();
-    spawn(&mut world, "floor", square(2.0 * half, 0.0, true), matt(0.0, 0.0));
-    spawn(&mut world, "lamp", square(2.0 * half, half, false), matt(0.0, 1.0));
+    spawn(&mut world, "floor", square(2.0 * half, 0.0, true), grey(0.0, 0.0));
+    spawn(&mut world, "lamp", square(2.0 * half, half, false), grey(0.0, 1.0));
     run(&mut world, &draft(48));
-    let found = irradiance(&mut world, DVec3::Y, [DVec3::ZERO])[0];
-    // Four corners, each as far as high: 4/(2π) · 2 · (1/√2) atan(1/√2).
+    let measured = irradiance(&mut world, DVec3::Y, [DVec3::ZERO])[0];
+    // The form factor to four quarters of side a = height: 4/(2π) · 2 · (1/√2) atan(1/√2); E is π times that.
     let root = 0.5f64.sqrt();
     let why = "Lambert's formula, 2 √2 atan(1/√2); between texels of h/22, h² E''/8 along both axes and the texels' mean: 0.2 %";
-    Outcome::number(4.0 * root * root.atan(), found, 2e-3 * PI, why)
+    Outcome::number(4.0 * root * root.atan(), measured, 2e-3 * PI, why)
 }
 
 fn a_floor_of_a_millimetre() -> Outcome {
@@ -104,15 +107,15 @@ fn a_floor_of_a_hundred_kilometres() -> Outcome {
 fn scaled_by(exponent: i32) -> Outcome {
     let [mut plain, mut scaled] = [1.0, 2f32.powi(exponent)].map(|scale| {
         let mut world = World::new();
-        spawn(&mut world, "floor", square(3.0 * scale, 0.0, true), matt(0.7, 0.0));
-        spawn(&mut world, "shelf", square(0.7 * scale, 0.6 * scale, true), matt(0.4, 0.0));
-        spawn(&mut world, "lamp", square(1.1 * scale, 1.3 * scale, false), matt(0.2, 3.0));
+        spawn(&mut world, "floor", square(3.0 * scale, 0.0, true), grey(0.7, 0.0));
+        spawn(&mut world, "shelf", square(0.7 * scale, 0.6 * scale, true), grey(0.4, 0.0));
+        spawn(&mut world, "lamp", square(1.1 * scale, 1.3 * scale, false), grey(0.2, 3.0));
         run(&mut world, &draft(24));
         world
     });
     let why =
         "texels that differ in a bit: everything is computed in canonical units, and no length is absolute";
-    Outcome::number(0.0, different(&mut plain, &mut scaled), 0.0, why)
+    Outcome::number(0.0, differing_values(&mut plain, &mut scaled), 0.0, why)
 }
 
 fn a_thousand_times_smaller_by_two_to_the_tenth() -> Outcome {
@@ -123,8 +126,9 @@ fn a_hundred_thousand_times_larger_by_two_to_the_seventeenth() -> Outcome {
     scaled_by(17)
 }
 
-/// Rays from inside a closed surface, at random, at points of edges and at vertices: how many escape.
-fn escapes(triangles: &[[Vec3; 3]], inside: impl Fn(&mut Random) -> Vec3, rays: usize) -> f64 {
+/// Counts the rays from inside a closed surface that escape: a third each in random directions, towards points of edges
+/// and towards vertices.
+fn escaping_rays(triangles: &[[Vec3; 3]], inside: impl Fn(&mut Random) -> Vec3, rays: usize) -> f64 {
     let bvh = Bvh::build(triangles);
     let mut random = Random(7);
     let escapes = |i: &usize| {
@@ -151,27 +155,27 @@ fn in_the_box(random: &mut Random) -> Vec3 {
 }
 
 fn a_closed_box() -> Outcome {
-    Outcome::number(0.0, escapes(&cuboid(LOW, HIGH), in_the_box, 1_000_000), 0.0, WATERTIGHT)
+    Outcome::number(0.0, escaping_rays(&cuboid(LOW, HIGH), in_the_box, 1_000_000), 0.0, WATERTIGHT)
 }
 
 fn a_closed_sphere() -> Outcome {
     let middle = Vec3::new(0.1, -0.2, 0.3);
-    let found = escapes(&sphere(4, 1.0, middle), |random| middle + random.cube() * 0.5, 1_000_000);
-    Outcome::number(0.0, found, 0.0, WATERTIGHT)
+    let escaped = escaping_rays(&sphere(4, 1.0, middle), |random| middle + random.cube() * 0.5, 1_000_000);
+    Outcome::number(0.0, escaped, 0.0, WATERTIGHT)
 }
 
 fn a_missing_triangle_is_seen() -> Outcome {
     let triangles = sphere(3, 1.0, Vec3::ZERO);
-    let found = escapes(&triangles[1..], |random| random.cube() * 0.01, 300_000) / 300_000.0;
+    let share = escaping_rays(&triangles[1..], |random| random.cube() * 0.01, 300_000) / 300_000.0;
     let why = "negative control: of 512 faces one is open, for the third of the rays that are random; those at edges and corners go by its own";
-    Outcome::number(1.0 / 512.0 / 3.0, found, 5e-4, why)
+    Outcome::number(1.0 / 512.0 / 3.0, share, 5e-4, why)
 }
 
-/// The box with one side of its ceiling cut in two, at a vertex that the walls do not have.
+/// The box with one of its triangles split in two at a vertex on its edge that the neighbouring triangle does not have.
 fn with_t_junctions() -> Vec<[Vec3; 3]> {
     let mut triangles = cuboid(LOW, HIGH);
     let [a, b, c] = triangles.remove(6);
-    // A third of the way: no number of f32 lies there exactly.
+    // A third of the way is not representable in f32.
     let middle = a.lerp(b, 1.0 / 3.0);
     triangles.extend([[a, middle, c], [middle, b, c]]);
     triangles
@@ -181,10 +185,10 @@ fn a_box_with_t_junctions() -> Outcome {
     let bvh = Bvh::build(&with_t_junctions());
     let mut random = Random(3);
     let rays = 2_000_000;
-    let found = (0..rays)
+    let escaped = (0..rays)
         .filter(|_| bvh.closest_hit(&Ray::new(in_the_box(&mut random), random.direction())).is_none());
     let why = "of two million random rays: the slit is half an ulp wide, 2^-24 of the side, and is met by 0.1 of them";
-    Outcome::number(0.0, found.count() as f64, 2.0, why)
+    Outcome::number(0.0, escaped.count() as f64, 2.0, why)
 }
 
 fn aimed_at_t_junctions() -> Outcome {
@@ -209,7 +213,7 @@ fn a_furnace_with_t_junctions() -> Outcome {
         ..TriangleMesh::default()
     };
     let mut world = World::new();
-    let room = spawn(&mut world, "room", mesh, matt(0.5, 1.0));
+    let room = spawn(&mut world, "room", mesh, grey(0.5, 1.0));
     run(&mut world, &draft(48));
     let why = "π L / (1 - ρ): what passes the slits is no light lost that could be measured; 0.5 % for the row sums";
     Outcome::number(2.0 * PI, mean_of(&world, room), 5e-3 * 2.0 * PI, why)

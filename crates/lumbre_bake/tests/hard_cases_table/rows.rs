@@ -1,6 +1,6 @@
-//! The rows of the list in its order, each with what is done about it and the tests that it has elsewhere.
+//! The rows of the table in their order. Each has a text on how the baker handles the case, with links to other tests.
 
-/// A row and what is said about it.
+/// The title of each row and its text.
 pub const ROWS: [(&str, &str); 13] = [
     (
         "a ray hits the face it left, scenes of 1e-3 to 1e5 m",

@@ -1,4 +1,4 @@
-//! What a program of ours is asked to look at: a file, or a held-out scene by its name. Not the scenes.
+//! Loads the input of an example: a file, or a held-out scene by its name.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use bevy_ecs::world::World;
 
 use super::scenes;
 
-/// The held-out scene of that name, at its own scale, or what the file holds.
+/// Builds the held-out scene of that name at its original scale; if there is none, loads the file.
 pub fn world_of(input: &Path) -> Result<World, lumbre_scene::LoadError> {
     if let Some((scene, layout)) = input.to_str().and_then(scenes::find) {
         return Ok(scene(layout, 1.0));

@@ -1,5 +1,5 @@
-//! Points with their converged irradiance as text: the columns of the conformance suite, and of a level's points two more. Not where
-//! they come from.
+//! Reads and writes reference points as CSV: the columns of the conformance suite, and two more for a level's points.
+//! The path tracer computes them.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,7 +10,8 @@ use super::path_tracer::Irradiance;
 
 const COLUMNS: &str = "x,y,z,nx,ny,nz,E_r,E_g,E_b,se_r,se_g,se_b";
 
-/// Points with their errors; NaN where a channel is unknown. Without the last two columns no point is near an edge and all are inside.
+/// Reads points with their standard errors; a channel that is unknown is NaN. Without the last two columns, no point
+/// counts as near an edge and all count as inside the region.
 pub fn read(path: &Path) -> Vec<Irradiance> {
     let text = std::fs::read_to_string(path).expect("the reference file is readable text");
     let rows = text.lines().skip(1).map(|line| {
@@ -28,7 +29,7 @@ pub fn read(path: &Path) -> Vec<Irradiance> {
     rows.collect()
 }
 
-/// To six significant digits, errors to three.
+/// Writes points with six significant digits, their standard errors with three.
 pub fn write(path: &Path, points: &[Irradiance]) -> std::io::Result<()> {
     let mut text = format!("{COLUMNS},edge,inside\n");
     for p in points {
@@ -41,8 +42,8 @@ pub fn write(path: &Path, points: &[Irradiance]) -> std::io::Result<()> {
     std::fs::write(path, text)
 }
 
-/// With so many digits after the first.
+/// Rounds to `digits` decimal digits after the first significant one.
 fn rounded(x: f64, digits: usize) -> f64 {
-    // What is a rounding of 0 says nothing in its digits.
+    // Values this small are rounding errors of 0.
     if x.abs() < 1e-12 { 0.0 } else { format!("{x:.digits$e}").parse().unwrap_or(x) }
 }

@@ -1,5 +1,5 @@
-//! A picture of a lightmapped world from its camera, by ray casting on the processor: diffuse colour times the map. Not the frame of the
-//! renderer, and no highlights.
+//! A picture of a lightmapped world from its camera, by ray casting on the CPU: diffuse colour times the lightmap,
+//! without highlights. It is independent of the renderer.
 
 use std::path::Path;
 
@@ -15,17 +15,17 @@ use super::path_tracer::triangles;
 use crate::common::{Surface, bilinear};
 use lumbre_trace::flip::Picture;
 
-/// Radiance row by row.
+/// The radiance of the pixels, row by row.
 pub struct View {
     pub width: usize,
     pub radiance: Vec<DVec3>,
 }
 
-/// What the logarithmic average of a picture is shown as, linear.
+/// The linear value at which the logarithmic average of a picture is shown.
 const MIDDLE_GREY: f64 = 0.18;
 
 impl View {
-    /// From the first perspective camera; `None` without one.
+    /// Renders the view of the world's first camera; `None` if there is none or it is not a perspective camera.
     pub fn of(world: &mut World, width: usize, height: usize) -> Option<Self> {
         let scene = Hierarchy::new(triangles(world));
         let objects = lightmapped(world);
@@ -44,25 +44,25 @@ impl View {
             if triangle.normal.dot(direction) >= 0.0 {
                 return DVec3::ZERO;
             }
-            let shares = triangle.shares(place.translation + direction * hit.distance);
+            let weights = triangle.barycentric(place.translation + direction * hit.distance);
             let [object, index] = triangle.source;
             let light = objects[object].as_ref().map_or(DVec3::ZERO, |(triangles, image)| {
                 let (_, [a, b, c]) = triangles[index];
-                bilinear(image, a + (b - a) * shares.x + (c - a) * shares.y)
+                bilinear(image, a + (b - a) * weights.x + (c - a) * weights.y)
             });
             triangle.reflectance * light + triangle.emission
         };
         Some(Self { width, radiance: (0..width * height).into_par_iter().map(pixel).collect() })
     }
 
-    /// The factor that brings the logarithmic average to the middle of what a monitor shows.
+    /// The factor that maps the logarithmic average to middle grey.
     pub fn exposure(&self) -> f64 {
         let lit = || self.radiance.iter().map(|color| color.element_sum() / 3.0).filter(|light| *light > 0.0);
         let logarithm = lit().map(f64::ln).sum::<f64>() / lit().count().max(1) as f64;
         MIDDLE_GREY / logarithm.exp()
     }
 
-    /// As a monitor shows it.
+    /// The picture with this exposure, clamped and sRGB-encoded (IEC 61966-2-1).
     pub fn exposed(&self, exposure: f64) -> Picture {
         let channel = |v: f64| match (v * exposure).clamp(0.0, 1.0) {
             v if v <= 0.003_130_8 => 12.92 * v,
@@ -73,7 +73,7 @@ impl View {
     }
 }
 
-/// In the order of the path tracer's objects.
+/// The lightmap coordinates and lightmaps of all objects, in the order of the path tracer's objects.
 fn lightmapped(world: &mut World) -> Vec<Option<Surface>> {
     let mut query =
         world.query_filtered::<(&Mesh, &Material, Option<&Lightmap>, &GlobalTransform), With<StaticObject>>();

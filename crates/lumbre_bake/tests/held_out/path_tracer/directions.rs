@@ -1,4 +1,5 @@
-//! Where a path goes on: by the cosine, and half of the paths through the openings that light comes in by. Not what it meets there.
+//! Samples the next direction of a path: by the cosine or, in a region with openings, half of the time towards one of
+//! the openings through which light enters.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,7 +7,6 @@ use glam::DVec3;
 
 use super::super::scenes::region::Region;
 
-/// Rectangles: a corner and two edges.
 pub struct Directions {
     region: Option<Region>,
 }
@@ -16,7 +16,8 @@ impl Directions {
         Self { region: region.filter(|region| !region.openings.is_empty()) }
     }
 
-    /// A direction and what its light weighs against one by the cosine; nothing if it is under the horizon.
+    /// Samples a direction by two uniform numbers. Returns it with the ratio of the cosine density to the density that
+    /// it was sampled with, or `None` if it lies below the horizon.
     pub fn choose(&self, origin: DVec3, normal: DVec3, u: f64, v: f64) -> Option<(DVec3, f64)> {
         let guided = self.region.as_ref().filter(|region| region.holds(origin));
         let Some(Region { openings, .. }) = guided else { return Some((cosine(normal, u, v), 1.0)) };
@@ -33,12 +34,12 @@ impl Directions {
         }
         let density = |opening: &[DVec3; 3]| density(origin, direction, opening);
         let through = openings.iter().map(density).sum::<f64>() / openings.len() as f64;
-        let own = facing / PI;
-        Some((direction, own / (0.5 * own + 0.5 * through)))
+        let by_cosine = facing / PI;
+        Some((direction, by_cosine / (0.5 * by_cosine + 0.5 * through)))
     }
 }
 
-/// Per solid angle, of directions to points of a rectangle chosen evenly.
+/// The density per solid angle of the direction to a point chosen uniformly on a rectangle.
 fn density(origin: DVec3, direction: DVec3, [corner, right, up]: &[DVec3; 3]) -> f64 {
     let across = right.cross(*up);
     let ahead = direction.dot(across);
@@ -48,11 +49,11 @@ fn density(origin: DVec3, direction: DVec3, [corner, right, up]: &[DVec3; 3]) ->
     }
     let at = origin + direction * distance - *corner;
     let inside = |edge: DVec3| (-1e-12..=1.0 + 1e-12).contains(&(at.dot(edge) / edge.length_squared()));
-    // The area that it has from here, over its squared distance.
+    // Squared distance over the projected area: |across| is the rectangle's area.
     if inside(*right) && inside(*up) { distance * distance / ahead.abs() } else { 0.0 }
 }
 
-/// A direction by the cosine about a normal.
+/// A direction distributed by the cosine about a normal.
 pub fn cosine(normal: DVec3, u: f64, v: f64) -> DVec3 {
     let (right, up) = normal.any_orthonormal_pair();
     let (radius, angle) = (u.sqrt(), TAU * v);

@@ -1,4 +1,4 @@
-//! Triangles in double precision and a bounding volume hierarchy over them. Not what light does at them.
+//! Triangles in double precision, and a bounding volume hierarchy for ray casts against them.
 
 use std::sync::Arc;
 
@@ -13,16 +13,17 @@ pub struct Triangle {
     pub area: f64,
     pub reflectance: DVec3,
     pub emission: DVec3,
-    /// What multiplies the emission, and where its corners are in it.
+    /// A texture that multiplies the emission, and the texture coordinates of the corners.
     pub picture: Option<(Arc<Image>, [DVec2; 3])>,
-    /// Mesh by its place in the query, triangle of the mesh.
+    /// The index of the mesh in the query, and the index of the triangle in that mesh.
     pub source: [usize; 2],
 }
 
 struct Node {
     low: DVec3,
     high: DVec3,
-    /// Triangles from here, `count` of them; inner nodes have none, their first child follows and the second is here.
+    /// In a leaf, the first of its `count` triangles. In an inner node, whose `count` is 0, the index of its second
+    /// child; the first child directly follows the node.
     first: usize,
     count: usize,
 }
@@ -39,12 +40,13 @@ pub struct Hierarchy {
 }
 
 impl Triangle {
+    /// The point of two uniform numbers; it is uniformly distributed over the triangle.
     pub fn point(&self, u: f64, v: f64) -> DVec3 {
         let root = u.sqrt();
         self.a + self.ab * (root * (1.0 - v)) + self.ac * (root * v)
     }
 
-    /// Möller and Trumbore, both sides.
+    /// Intersects a ray with the triangle from both sides (Möller and Trumbore) and returns the distance.
     fn hit(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         let p = direction.cross(self.ac);
         let determinant = self.ab.dot(p);
@@ -61,17 +63,17 @@ impl Triangle {
         (v >= -1e-12 && u + v <= 1.0 + 1e-12).then(|| self.ac.dot(q) / determinant)
     }
 
-    /// The point of these shares of the second and third corner.
-    pub fn at(&self, shares: DVec2) -> DVec3 {
-        self.a + self.ab * shares.x + self.ac * shares.y
+    /// The point with these barycentric coordinates with respect to the second and third corner.
+    pub fn at(&self, barycentric: DVec2) -> DVec3 {
+        self.a + self.ab * barycentric.x + self.ac * barycentric.y
     }
 
     pub fn longest_edge(&self) -> f64 {
         self.ab.length().max(self.ac.length()).max((self.ac - self.ab).length())
     }
 
-    /// Shares of the second and third corner at a point of its plane.
-    pub fn shares(&self, point: DVec3) -> DVec2 {
+    /// The barycentric coordinates of a point of the plane with respect to the second and third corner.
+    pub fn barycentric(&self, point: DVec3) -> DVec2 {
         let d = point - self.a;
         let size = 2.0 * self.area;
         DVec2::new(d.cross(self.ac).dot(self.normal), self.ab.cross(d).dot(self.normal)) / size
@@ -94,29 +96,31 @@ impl Hierarchy {
         Self { triangles, nodes }
     }
 
-    /// Lowest and highest corner of all.
+    /// The lowest and the highest corner of the bounding box of all triangles.
     pub fn bounds(&self) -> [DVec3; 2] {
         [self.nodes[0].low, self.nodes[0].high]
     }
 
+    /// Whether a triangle blocks the segment between two points.
     pub fn hidden(&self, from: DVec3, to: DVec3) -> bool {
-        self.walk(from, to - from, 1.0, true).is_some()
+        self.intersect(from, to - from, 1.0, true).is_some()
     }
 
-    /// Whether anything lies along a direction, however far.
+    /// Whether a triangle lies in a direction, at any distance.
     pub fn hidden_along(&self, from: DVec3, direction: DVec3) -> bool {
-        self.walk(from, direction, f64::INFINITY, true).is_some()
+        self.intersect(from, direction, f64::INFINITY, true).is_some()
     }
 
     pub fn closest(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
-        self.walk(origin, direction, f64::INFINITY, false)
+        self.intersect(origin, direction, f64::INFINITY, false)
     }
 
-    fn walk(&self, origin: DVec3, direction: DVec3, mut most: f64, any: bool) -> Option<Hit> {
+    /// Returns the closest hit nearer than `max_distance`, or the first one found if `any` is set.
+    fn intersect(&self, origin: DVec3, direction: DVec3, mut max_distance: f64, any: bool) -> Option<Hit> {
         let inverse = direction.recip();
         let mut stack = [0usize; 64];
         let mut depth = 1;
-        let mut found = None;
+        let mut closest = None;
         while depth > 0 {
             depth -= 1;
             let index = stack[depth];
@@ -124,7 +128,7 @@ impl Hierarchy {
             let (s, t) = ((node.low - origin) * inverse, (node.high - origin) * inverse);
             let enters = s.min(t).max_element();
             let leaves = s.max(t).min_element();
-            if enters > leaves * (1.0 + 1e-9) || leaves < 0.0 || enters > most {
+            if enters > leaves * (1.0 + 1e-9) || leaves < 0.0 || enters > max_distance {
                 continue;
             }
             if node.count == 0 {
@@ -134,21 +138,22 @@ impl Hierarchy {
                 continue;
             }
             for triangle in node.first..node.first + node.count {
-                let hit = self.triangles[triangle].hit(origin, direction).filter(|&t| t > 0.0 && t < most);
+                let hit =
+                    self.triangles[triangle].hit(origin, direction).filter(|&t| t > 0.0 && t < max_distance);
                 if let Some(distance) = hit {
-                    most = distance;
-                    found = Some(Hit { distance, triangle });
+                    max_distance = distance;
+                    closest = Some(Hit { distance, triangle });
                     if any {
-                        return found;
+                        return closest;
                     }
                 }
             }
         }
-        found
+        closest
     }
 }
 
-/// Halves by the median along the longest axis; children follow their parent.
+/// Splits the triangles at the median along the longest axis, recursively, in depth-first order.
 fn build(triangles: &mut [Triangle], first: usize, end: usize, nodes: &mut Vec<Node>) {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for corner in triangles[first..end].iter().flat_map(Triangle::corners) {

@@ -1,5 +1,6 @@
-//! Light that comes straight from emissive triangles: pieces of them are chosen near a place, and of a few candidates one by what it would give
-//! unhidden (resampled importance sampling: Talbot, Cline and Egbert, 2005), without bias. Not punctual lights.
+//! Direct light from emissive triangles: a few candidates are chosen among pieces near a place, and one of them by the
+//! light that it would bring unshadowed (resampled importance sampling: Talbot, Cline and Egbert, 2005), without bias.
+//! Punctual lights are in `punctual`.
 
 use glam::{DVec2, DVec3};
 use lumbre_scene::Image;
@@ -12,22 +13,23 @@ use super::spherical_triangle;
 
 pub struct Lamps {
     pieces: Vec<Piece>,
-    near: ChoiceGrid,
+    grid: ChoiceGrid,
 }
 
-/// Pieces along the edge of a triangle whose emission varies, and points along the edge of a piece that its power is taken from.
+/// The number of pieces along an edge of a triangle with an emissive texture, and the number of points along an edge of
+/// a piece by which its power is estimated.
 const PIECES: u32 = 64;
 const POINTS: u32 = 8;
-/// Sizes of a piece up to which it is near.
+/// A piece nearer than this multiple of its size is sampled by solid angle.
 const NEAR: f64 = 4.0;
-/// Of each that sends a shadow ray, at most.
+/// The largest number of candidates for a shadow ray.
 const CANDIDATES: usize = 8;
 
-/// A point that shines.
+/// A sampled point on a lamp.
 struct Candidate {
-    /// Just before it.
+    /// The point, moved slightly off the lamp's surface.
     target: DVec3,
-    /// Irradiance where nothing is in the way, over the density of the point.
+    /// Its unshadowed irradiance over the density of the point.
     light: DVec3,
     weight: f64,
 }
@@ -39,17 +41,18 @@ impl Lamps {
             if triangle.emission == DVec3::ZERO {
                 continue;
             }
-            let mut own = cut(index, triangle);
-            // Of what is between the points nothing is known: none is left out.
-            let share = own.iter().map(|piece| piece.power).sum::<f64>() / own.len() as f64;
-            own.iter_mut().for_each(|piece| piece.power += 0.03 * share);
-            pieces.extend(own.into_iter().filter(|piece| piece.power > 0.0));
+            let mut parts = cut(index, triangle);
+            // The emission between the sampled points is unknown: every piece gets a minimum power, so that none is
+            // left out.
+            let mean = parts.iter().map(|piece| piece.power).sum::<f64>() / parts.len() as f64;
+            parts.iter_mut().for_each(|piece| piece.power += 0.03 * mean);
+            pieces.extend(parts.into_iter().filter(|piece| piece.power > 0.0));
         }
-        let things: Vec<_> = pieces.iter().map(|piece| (piece.middle, piece.size, piece.power)).collect();
-        Self { near: ChoiceGrid::new(scene.bounds(), &things), pieces }
+        let sources: Vec<_> = pieces.iter().map(|piece| (piece.middle, piece.size, piece.power)).collect();
+        Self { grid: ChoiceGrid::new(scene.bounds(), &sources), pieces }
     }
 
-    /// A choice for one place and the way it faces.
+    /// A distribution over all pieces for one point and its normal.
     pub fn choice_for(&self, scene: &Hierarchy, origin: DVec3, normal: DVec3) -> Choice {
         let weight = |piece: &Piece| {
             let towards = piece.middle - origin;
@@ -58,7 +61,7 @@ impl Lamps {
                 return piece.power / squared.max(0.01 * piece.size * piece.size);
             }
             let direction = towards / squared.sqrt();
-            // All of it may be under the horizon, or only its middle.
+            // The piece's centre may be below the horizon while a part of it is above.
             let cosine = |cosine: f64| cosine.max(0.0) + 0.01 + piece.size / squared.sqrt();
             let emitted = -scene.triangles[piece.triangle].normal.dot(direction);
             piece.power / squared * cosine(normal.dot(direction)) * cosine(emitted)
@@ -66,11 +69,12 @@ impl Lamps {
         Choice::new(self.pieces.iter().map(weight))
     }
 
+    /// The distribution of the grid cell at a point, which is cheaper but less exact.
     pub fn choice_near(&self, origin: DVec3) -> Option<&Choice> {
-        self.near.at(origin)
+        self.grid.at(origin)
     }
 
-    /// Irradiance by one shadow ray.
+    /// Estimates the irradiance by one shadow ray.
     pub fn irradiance(
         &self,
         scene: &Hierarchy,
@@ -84,16 +88,16 @@ impl Lamps {
         let mut candidates: [Option<Candidate>; CANDIDATES] = Default::default();
         let mut sum = 0.0;
         for (index, candidate) in candidates[..count].iter_mut().enumerate() {
-            // Spread evenly over the choice: each by itself is where `u` would put it.
+            // The candidates are stratified over the distribution.
             let number = (index as f64 + u) / count as f64;
             let v = if index == 0 { v } else { random.uniform() };
             *candidate = self.candidate(scene, [origin, normal], choice, [number, v], offset);
             sum += candidate.as_ref().map_or(0.0, |candidate| candidate.weight);
         }
-        let mut left = random.uniform() * sum;
+        let mut remaining = random.uniform() * sum;
         for candidate in candidates.iter().flatten() {
-            left -= candidate.weight;
-            if left < 0.0 {
+            remaining -= candidate.weight;
+            if remaining < 0.0 {
                 if scene.hidden(origin, candidate.target) {
                     return DVec3::ZERO;
                 }
@@ -114,11 +118,11 @@ impl Lamps {
         let (index, probability, u) = choice.pick(number)?;
         let piece = &self.pieces[index];
         let triangle = &scene.triangles[piece.triangle];
-        // Near pieces by what is seen of them, so that no point weighs much.
+        // Near pieces are sampled uniformly by solid angle, so that no point gets a large weight.
         let near = origin.distance_squared(piece.middle) < NEAR * NEAR * piece.size * piece.size;
-        let seen =
+        let by_solid_angle =
             if near { spherical_triangle::sample(origin, piece.corners(triangle), [u, v]) } else { None };
-        let (target, density) = match seen {
+        let (target, density) = match by_solid_angle {
             Some((direction, angle)) => {
                 let ahead = triangle.normal.dot(direction);
                 let distance = triangle.normal.dot(triangle.a - origin) / ahead;
@@ -127,7 +131,7 @@ impl Lamps {
                 }
                 (origin + direction * distance, -ahead / (distance * distance * angle))
             }
-            None => (triangle.at(piece.shares([u, v])), 1.0 / piece.area),
+            None => (triangle.at(piece.barycentric([u, v])), 1.0 / piece.area),
         };
         let towards = target - origin;
         let squared = towards.length_squared();
@@ -136,7 +140,7 @@ impl Lamps {
         if cosines <= 0.0 {
             return None;
         }
-        let radiance = emission(triangle, triangle.shares(target));
+        let radiance = emission(triangle, triangle.barycentric(target));
         let light = radiance * (cosines / squared / (density * probability));
         let weight = light.element_sum();
         let target = target + triangle.normal * offset;
@@ -144,30 +148,31 @@ impl Lamps {
     }
 }
 
+/// Cuts a triangle into pieces and estimates their power. A triangle without a texture remains one piece.
 fn cut(index: usize, triangle: &Triangle) -> Vec<Piece> {
-    let sides = if triangle.picture.is_some() { PIECES } else { 1 };
+    let divisions = if triangle.picture.is_some() { PIECES } else { 1 };
     let power = |piece: &Piece| {
         if triangle.picture.is_none() {
             return triangle.emission.element_sum() * piece.area;
         }
         let points = (0..POINTS * POINTS).map(|point| {
             let at = [point % POINTS, point / POINTS].map(|i| (f64::from(i) + 0.5) / f64::from(POINTS));
-            emission(triangle, piece.shares(at))
+            emission(triangle, piece.barycentric(at))
         });
         points.sum::<DVec3>().element_sum() / f64::from(POINTS * POINTS) * piece.area
     };
-    let mut pieces = pieces::cut(index, triangle, sides);
+    let mut pieces = pieces::cut(index, triangle, divisions);
     pieces.iter_mut().for_each(|piece| piece.power = power(piece));
     pieces
 }
 
-/// Radiance at a point of a triangle.
-fn emission(triangle: &Triangle, shares: DVec2) -> DVec3 {
+/// The emitted radiance at a point of a triangle.
+fn emission(triangle: &Triangle, barycentric: DVec2) -> DVec3 {
     let Some((image, [a, b, c])) = &triangle.picture else { return triangle.emission };
-    triangle.emission * bilinear(image, *a + (*b - *a) * shares.x + (*c - *a) * shares.y)
+    triangle.emission * bilinear(image, *a + (*b - *a) * barycentric.x + (*c - *a) * barycentric.y)
 }
 
-/// Linear colour of a picture in sRGB, clamped at its border.
+/// The linear colour of an sRGB image, filtered bilinearly and clamped at the border.
 fn bilinear(image: &Image, at: DVec2) -> DVec3 {
     let size = DVec2::new(f64::from(image.width), f64::from(image.height));
     let at = at * size - 0.5;
@@ -182,7 +187,7 @@ fn bilinear(image: &Image, at: DVec2) -> DVec3 {
     top.lerp(bottom, f.y)
 }
 
-/// IEC 61966-2-1.
+/// Decodes an sRGB value (IEC 61966-2-1).
 fn linear(value: u8) -> f64 {
     let v = f64::from(value) / 255.0;
     if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }

@@ -1,11 +1,12 @@
-//! Converged irradiance at points of a world's surfaces: f64, next-event estimation, Russian roulette, a bounding volume
-//! hierarchy of its own. Front sides are diffuse, emitters one-sided, back sides black; the sky is one colour. Shares no code with the baker.
+//! Path tracer for converged irradiance at points of a world's surfaces: f64, next-event estimation, Russian roulette,
+//! and a bounding volume hierarchy of its own. Front sides are diffuse, emitters one-sided, back sides black; the sky
+//! has one colour. It shares no code with the baker.
 
-mod bounced;
 mod bright;
 mod choice;
 mod directions;
 pub mod hierarchy;
+mod indirect_cache;
 mod lamps;
 mod pieces;
 mod points;
@@ -22,10 +23,10 @@ use rayon::prelude::*;
 
 use super::random::Random;
 use super::scenes::region::Region;
-use bounced::{Bounced, SETS};
-use bright::Bright;
+use bright::BrightPieces;
 use directions::Directions;
 use hierarchy::{Hierarchy, Triangle};
+use indirect_cache::{IndirectCache, SETS};
 use lamps::Lamps;
 use punctual::PunctualLights;
 
@@ -33,45 +34,47 @@ pub struct PathTracer {
     pub scene: Hierarchy,
     lamps: Lamps,
     lights: PunctualLights,
-    /// Radiance of what leaves the scene.
+    /// The radiance that a ray which leaves the scene brings.
     sky: DVec3,
     directions: Directions,
     region: Option<Region>,
-    bright: Option<Bright>,
-    /// Where paths end at their first bounce.
-    bounced: Option<Bounced>,
+    bright: Option<BrightPieces>,
+    /// If there is one, paths end at their first bounce and read the rest of their light from it.
+    indirect_cache: Option<IndirectCache>,
+    /// The distance from a surface at which rays start.
     pub offset: f64,
 }
 
-/// A point and its irradiance with standard errors, W/m².
+/// A point with its irradiance and the standard errors of that, W/m².
 #[derive(Clone, Copy, Debug)]
 pub struct Irradiance {
     pub position: DVec3,
     pub normal: DVec3,
     pub value: DVec3,
     pub error: DVec3,
-    /// Direct light changes much within a texel.
+    /// Whether the direct light changes much within a texel of the point.
     pub edge: bool,
-    /// In the level's region; everywhere in a scene that has none.
+    /// Whether the point is in the level's region; always true in a scene that has none.
     pub inside: bool,
 }
 
-/// What is spent on a point: batches of `side`² paths until the standard error is that share of the irradiance.
+/// The effort for a point: batches of `side`² paths, as many as bring the standard error down to the share `error` of
+/// the irradiance.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     pub side: usize,
     pub error: f64,
-    /// Fewest and most.
+    /// The smallest and the largest number of batches.
     pub batches: [usize; 2],
 }
 
 impl Effort {
-    /// So many batches for every point.
+    /// The same number of batches for every point.
     pub fn fixed(batches: usize, side: usize) -> Self {
         Self { side, error: 0.0, batches: [batches; 2] }
     }
 
-    /// 0.4 %, unless 58,000 paths leave more.
+    /// A standard error of 0.4 %, unless it is still larger after 58,000 paths.
     pub fn reference() -> Self {
         Self { side: 24, error: 0.004, batches: [8, 100] }
     }
@@ -94,21 +97,21 @@ impl PathTracer {
             offset: 1e-9 * (high - low).length(),
             scene,
             bright: None,
-            bounced: None,
+            indirect_cache: None,
         };
-        tracer.bright = tracer.region.is_some().then(|| Bright::new(&tracer));
+        tracer.bright = tracer.region.is_some().then(|| BrightPieces::new(&tracer));
         tracer
     }
 
-    /// Ends paths at their first bounce by light that was gathered there before: far less noise in dark places, and light by two and more bounces
-    /// that is even over a quarter of a metre.
+    /// Precomputes a cache of indirect light in which paths end at their first bounce: dark places have far less noise,
+    /// but the light of two and more bounces is constant over pieces of a quarter of a metre.
     #[must_use]
-    pub fn with_bounced(mut self, seed: u64) -> Self {
-        self.bounced = Some(Bounced::new(&self, seed));
+    pub fn with_indirect_cache(mut self, seed: u64) -> Self {
+        self.indirect_cache = Some(IndirectCache::new(&self, seed));
         self
     }
 
-    /// Irradiance at places with their normals.
+    /// Computes the irradiance at places with their normals.
     pub fn at(&self, places: &[(DVec3, DVec3)], effort: Effort, seed: u64) -> Vec<Irradiance> {
         let irradiance = |(index, &(position, normal)): (usize, &(DVec3, DVec3))| {
             let mut random = Random::new(seed ^ ((index as u64 + 1) << 20));
@@ -120,8 +123,8 @@ impl PathTracer {
         places.par_iter().enumerate().map(irradiance).collect()
     }
 
-    /// The mean of batches and its standard error. Their number is decided by others, which do not count: an error that also decided when to
-    /// end would be too small.
+    /// Returns the mean over batches and its standard error. A first set of batches, which is then discarded, decides
+    /// how many are needed: if the same samples decided when to stop, their standard error would come out too small.
     fn converged(
         &self,
         position: DVec3,
@@ -129,7 +132,7 @@ impl PathTracer {
         effort: Effort,
         random: &mut Random,
     ) -> (DVec3, DVec3) {
-        let mut spread = |groups: usize, count: usize| {
+        let mut mean_and_variance = |groups: usize, count: usize| {
             let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
             for group in 0..groups {
                 let batch = |_| self.batch(position, normal, effort.side, group % SETS, random);
@@ -144,19 +147,19 @@ impl PathTracer {
         let [fewest, most] = effort.batches;
         let mut count = most;
         if fewest < most {
-            let (value, variance) = spread(fewest, 1);
+            let (value, variance) = mean_and_variance(fewest, 1);
             let error = effort.error * value.element_sum() / 3.0;
-            let wanted = fewest as f64 * variance.element_sum() / (3.0 * error * error);
-            // What is lit by rare paths may have met none yet: more of them then.
-            count = if error > 0.0 { (wanted.ceil() as usize).clamp(fewest, most) } else { 4 * fewest };
+            let needed = fewest as f64 * variance.element_sum() / (3.0 * error * error);
+            // A point without light so far may be lit by rare paths only: it gets more batches than the minimum.
+            count = if error > 0.0 { (needed.ceil() as usize).clamp(fewest, most) } else { 4 * fewest };
         }
-        // Batches of one set of bounced light are not independent: they make one group.
-        let groups = if self.bounced.is_some() { SETS } else { count };
-        let (value, variance) = spread(groups, count.div_ceil(groups));
+        // Batches that use the same set of the cache are not independent: they form one group.
+        let groups = if self.indirect_cache.is_some() { SETS } else { count };
+        let (value, variance) = mean_and_variance(groups, count.div_ceil(groups));
         (value, DVec3::from_array(variance.to_array().map(f64::sqrt)))
     }
 
-    /// An unbiased estimate by a jittered grid of first directions, and one of places on the lamps.
+    /// One estimate of the irradiance, by a jittered grid of first directions and another one of places on the lamps.
     fn batch(&self, position: DVec3, normal: DVec3, side: usize, set: usize, random: &mut Random) -> DVec3 {
         let origin = position + normal * self.offset;
         let mut bounced = DVec3::ZERO;
@@ -164,7 +167,7 @@ impl PathTracer {
             let mut jitter = |cell: usize| (cell as f64 + random.uniform()) / side as f64;
             let (u, v) = (jitter(cell % side), jitter(cell / side));
             let number = (cell as f64 + random.uniform()) / (side * side) as f64;
-            bounced += self.reflected([origin, normal], number, random);
+            bounced += self.light_from_bright_pieces([origin, normal], number, random);
             if let Some((direction, weight)) = self.directions.choose(origin, normal, u, v) {
                 bounced += PI * weight * self.radiance(origin, direction, set, random);
             }
@@ -172,7 +175,7 @@ impl PathTracer {
         self.direct_light([origin, normal], side, random) + bounced / (side * side) as f64
     }
 
-    /// Irradiance straight from lamps and lights, by a jittered grid of `side`² places on them.
+    /// The direct irradiance from lamps and lights, by a jittered grid of `side`² places on them.
     fn direct_light(&self, at: [DVec3; 2], side: usize, random: &mut Random) -> DVec3 {
         let lamps = self.lamps.choice_for(&self.scene, at[0], at[1]);
         let few = self.lights.each(&self.scene, at, random);
@@ -185,15 +188,16 @@ impl PathTracer {
             if let Some(choice) = &lights {
                 let number = (cell as f64 + random.uniform()) / (side * side) as f64;
                 sum += self.lights.chosen(&self.scene, at, choice, number);
-            } else if self.lights.are_sized() {
+            } else if self.lights.have_size() {
                 sum += self.lights.each(&self.scene, at, random).unwrap_or_default();
             }
         }
-        let once = few.filter(|_| !self.lights.are_sized()).unwrap_or_default();
+        let once = few.filter(|_| !self.lights.have_size()).unwrap_or_default();
         sum / (side * side) as f64 + once
     }
 
-    /// Reflected (not emitted) radiance and that of the sky that comes from a direction.
+    /// The radiance that arrives from a direction, reflected or from the sky, but not emitted by the surface that is
+    /// hit: direct light samples the emitters.
     fn radiance(&self, mut origin: DVec3, mut direction: DVec3, set: usize, random: &mut Random) -> DVec3 {
         let (mut sum, mut weight) = (DVec3::ZERO, DVec3::ONE);
         for bounce in 1.. {
@@ -208,17 +212,17 @@ impl PathTracer {
             }
             weight *= triangle.reflectance;
             origin += direction * hit.distance;
-            let sought =
-                self.bright.as_ref().is_some_and(|b| b.seeks(self, hit.triangle, origin, hit.distance));
+            let already_sampled =
+                self.bright.as_ref().is_some_and(|b| b.samples(self, hit.triangle, origin, hit.distance));
             origin += normal * self.offset;
-            if !sought {
-                sum += weight * self.one_direct([origin, normal], random) / PI;
+            if !already_sampled {
+                sum += weight * self.direct_light_by_one_ray([origin, normal], random) / PI;
             }
-            if let Some(bounced) = &self.bounced {
-                sum += weight * bounced.at(self, set, hit.triangle, origin) / PI;
+            if let Some(cache) = &self.indirect_cache {
+                sum += weight * cache.at(self, set, hit.triangle, origin) / PI;
                 break;
             }
-            sum += weight * self.reflected([origin, normal], random.uniform(), random) / PI;
+            sum += weight * self.light_from_bright_pieces([origin, normal], random.uniform(), random) / PI;
             if bounce > 2 {
                 let survives = weight.max_element().min(0.95);
                 if random.uniform() >= survives {
@@ -234,13 +238,13 @@ impl PathTracer {
         sum
     }
 
-    /// Light that comes by one bounce from what is brightly lit.
-    fn reflected(&self, at: [DVec3; 2], number: f64, random: &mut Random) -> DVec3 {
+    /// The irradiance that brightly lit pieces reflect to a point, by one sample.
+    fn light_from_bright_pieces(&self, at: [DVec3; 2], number: f64, random: &mut Random) -> DVec3 {
         self.bright.as_ref().map_or(DVec3::ZERO, |bright| bright.irradiance(self, at, number, random))
     }
 
-    /// Direct light by one shadow ray each to a lamp and a light.
-    fn one_direct(&self, at: [DVec3; 2], random: &mut Random) -> DVec3 {
+    /// The direct irradiance, by one shadow ray to a lamp and one to a punctual light.
+    fn direct_light_by_one_ray(&self, at: [DVec3; 2], random: &mut Random) -> DVec3 {
         let place = [random.uniform(), random.uniform()];
         let lamp = self.lamps.choice_near(at[0]).map_or(DVec3::ZERO, |choice| {
             self.lamps.irradiance(&self.scene, at, choice, place, random, self.offset)
@@ -249,7 +253,7 @@ impl PathTracer {
     }
 }
 
-/// All that lights or hides, where it is in the world.
+/// The triangles of all static objects in world space.
 pub fn triangles(world: &mut World) -> Vec<Triangle> {
     let mut triangles = Vec::new();
     let mut meshes = world.query_filtered::<(&Mesh, &Material, Option<&MaterialTextures>, &GlobalTransform), bevy_ecs::prelude::With<StaticObject>>();

@@ -1,5 +1,5 @@
-//! Where converged light is asked for: points uniform by area on what can be seen, most of them in the level's region, and whether the direct
-//! light has an edge near one. Not the light there.
+//! Chooses the points at which a level's converged irradiance is computed: uniform by area on visible surfaces, most of
+//! them in the level's region. Also tests whether a point is near an edge of the direct light.
 
 use glam::DVec3;
 
@@ -7,17 +7,17 @@ use super::super::random::Random;
 use super::directions::cosine;
 use super::{Effort, Irradiance, PathTracer};
 
-/// Of a level's points, in its region.
+/// The least share of a level's points that lie in its region.
 const INSIDE: f64 = 0.85;
-/// Metres from a point to those that tell of an edge: a texel's size.
+/// The distance, in metres, over which an edge of the direct light is looked for: the size of a texel.
 const TEXEL: f64 = 0.025;
-/// Of the scene's size: faces so near to one another touch, though single precision leaves gaps.
+/// Faces nearer to one another than this share of the scene's size touch: single precision leaves gaps between them.
 const TOUCHING: f64 = 1e-7;
-/// The change of direct light over that which makes an edge, of all the light at the point.
+/// A change of the direct light over a texel that is more than this share of all light at the point counts as an edge.
 const EDGE: f64 = 0.05;
 
 impl PathTracer {
-    /// Points uniform by area on what can be seen, and the irradiance there.
+    /// Chooses points uniformly by area on visible surfaces and computes the irradiance there.
     pub fn points(&self, count: usize, effort: Effort, seed: u64) -> Vec<Irradiance> {
         let mut random = Random::new(seed);
         let inside = (self.share_inside() * count as f64).round() as usize;
@@ -26,7 +26,7 @@ impl PathTracer {
         self.at(&places, effort, seed)
     }
 
-    /// At least as many points as the region has of the area.
+    /// The share of the points that lie in the region: at least its share of the area.
     fn share_inside(&self) -> f64 {
         let Some(region) = &self.region else { return 0.0 };
         let (mut inside, mut all) = (0.0, 0.0);
@@ -37,6 +37,7 @@ impl PathTracer {
         INSIDE.max(inside / all)
     }
 
+    /// Chooses points inside or outside the region; fewer than `count` if there is hardly any such surface.
     fn places(&self, count: usize, inside: bool, random: &mut Random) -> Vec<(DVec3, DVec3)> {
         let mut sums = Vec::with_capacity(self.scene.triangles.len());
         let mut sum = 0.0;
@@ -45,10 +46,9 @@ impl PathTracer {
             sums.push(sum);
         }
         let mut places = Vec::new();
-        let mut tried = 0;
-        // Where there is no outside, or hardly one, there are fewer points.
-        while places.len() < count && tried < 2000 * count {
-            tried += 1;
+        let mut attempts = 0;
+        while places.len() < count && attempts < 2000 * count {
+            attempts += 1;
             let chosen = random.uniform() * sum;
             let index = sums.partition_point(|&sum| sum <= chosen).min(sums.len() - 1);
             let triangle = &self.scene.triangles[index];
@@ -59,55 +59,58 @@ impl PathTracer {
             if self.touches(position, triangle.normal) {
                 continue;
             }
-            // In the open: most of what it sees are fronts or the sky (not the outside of the walls).
-            let seen = (0..64).filter(|_| {
+            // Most directions from a visible point end at front sides or in the sky; this excludes the outside of
+            // walls.
+            let open_directions = (0..64).filter(|_| {
                 let direction = cosine(triangle.normal, random.uniform(), random.uniform());
                 match self.scene.closest(position + triangle.normal * self.offset, direction) {
                     Some(hit) => self.scene.triangles[hit.triangle].normal.dot(direction) < 0.0,
                     None => self.sky != DVec3::ZERO,
                 }
             });
-            if seen.count() > 32 {
+            if open_directions.count() > 32 {
                 places.push((position, triangle.normal));
             }
         }
         places
     }
 
-    /// Whether another face looks at this one from where it is.
+    /// Whether another face touches this point and faces it.
     fn touches(&self, position: DVec3, normal: DVec3) -> bool {
         let [low, high] = self.scene.bounds();
         let gap = TOUCHING * (high - low).length();
-        let (mut origin, mut left) = (position - normal * gap, 2.0 * gap);
-        while let Some(hit) = self.scene.closest(origin, normal).filter(|hit| hit.distance < left) {
+        let (mut origin, mut remaining) = (position - normal * gap, 2.0 * gap);
+        while let Some(hit) = self.scene.closest(origin, normal).filter(|hit| hit.distance < remaining) {
             if self.scene.triangles[hit.triangle].normal.dot(normal) < -0.5 {
                 return true;
             }
             let step = hit.distance + 1e-6 * gap;
-            (origin, left) = (origin + normal * step, left - step);
+            (origin, remaining) = (origin + normal * step, remaining - step);
         }
         false
     }
 
-    /// Whether direct light changes within a texel of a place by more than a twentieth of all its light.
+    /// Whether the direct light within a texel of a point differs from that at the point by more than a twentieth of
+    /// all its light.
     pub(super) fn near_shadow_edge(&self, position: DVec3, normal: DVec3, light: DVec3) -> bool {
         let (right, up) = normal.any_orthonormal_pair();
         let above = normal * (0.1 * TEXEL);
-        let own = self.direct(position, normal);
+        let at_point = self.direct(position, normal);
         (0..8).any(|step| {
             let angle = std::f64::consts::TAU * f64::from(step) / 8.0;
             let near = position + (right * angle.cos() + up * angle.sin()) * TEXEL;
-            // On the same face still, and not inside of what stands on it.
+            // Only neighbours on the same face count, and not inside of an object that stands on it.
             let open = !self.scene.hidden(position + above, near + above);
             let faces = |triangle: usize| self.scene.triangles[triangle].normal.dot(normal) > 0.99;
             let below = self.scene.closest(near + above, -normal);
             let same = below.is_some_and(|hit| hit.distance < 0.2 * TEXEL && faces(hit.triangle));
-            let change = if open && same { (self.direct(near, normal) - own).abs() } else { DVec3::ZERO };
+            let change =
+                if open && same { (self.direct(near, normal) - at_point).abs() } else { DVec3::ZERO };
             change.element_sum() > EDGE * light.element_sum()
         })
     }
 
-    /// Light that comes straight from lamps and lights, by the same numbers everywhere.
+    /// The direct light of lamps and lights, with the same random numbers at every point.
     fn direct(&self, position: DVec3, normal: DVec3) -> DVec3 {
         let mut random = Random::new(1);
         let at = [position + normal * self.offset, normal];

@@ -1,4 +1,5 @@
-//! Point lights and suns, of which many are chosen from as lamps are. Not emissive triangles.
+//! Direct light from point lights and suns. If there are many, they are sampled like lamps. Emissive triangles are in
+//! `lamps`.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,30 +13,32 @@ use super::choice::{Choice, ChoiceGrid};
 use super::hierarchy::Hierarchy;
 
 enum Place {
-    /// And the distance where its light has faded to nothing, m.
+    /// The position of a point light, and the distance in metres at which its light has faded to nothing.
     At(DVec3, f64),
-    /// To the light, and half the angle that it has.
+    /// The direction to a sun, and half of its angular diameter.
     Towards(DVec3, f64),
 }
 
 struct Punctual {
     place: Place,
-    /// W/sr of a point, W/m² of a sun.
+    /// W/sr for a point light, W/m² for a sun.
     strength: DVec3,
 }
 
 pub struct PunctualLights {
     lights: Vec<Punctual>,
-    /// Of many points; suns are then chosen one by one.
-    near: Option<ChoiceGrid>,
+    /// Used if there are many point lights.
+    grid: Option<ChoiceGrid>,
 }
 
-/// Up to so many are looked at one by one.
+/// Up to this number of lights, each is evaluated.
 const FEW: usize = 64;
+/// The number of candidates for a shadow ray if there are many lights.
 const CANDIDATES: usize = 8;
 
 impl PunctualLights {
-    /// Those that are baked whole. Lights with a cone, a radius or another law of distance are not known here.
+    /// Collects the lights that are baked entirely. Lights with a cone, a radius or another law of attenuation are not
+    /// supported.
     pub fn new(world: &mut World, scene: &Hierarchy) -> Self {
         let baked = |light: &Light| light.enabled && light.bake == BakeMode::Static;
         let lights: Vec<_> = world
@@ -54,42 +57,43 @@ impl PunctualLights {
                 Punctual { place, strength: light.diffuse.as_dvec3() * PI }
             })
             .collect();
-        let near = (lights.len() > FEW).then(|| {
-            let things = lights.iter().map(|light| match light.place {
+        let grid = (lights.len() > FEW).then(|| {
+            let sources = lights.iter().map(|light| match light.place {
                 Place::At(place, _) => (place, 0.0, light.strength.element_sum()),
                 Place::Towards(..) => panic!("a sun among many lights is not known to the path tracer"),
             });
-            ChoiceGrid::new(scene.bounds(), &things.collect::<Vec<_>>())
+            ChoiceGrid::new(scene.bounds(), &sources.collect::<Vec<_>>())
         });
-        Self { lights, near }
+        Self { lights, grid }
     }
 
-    /// All of them, by one shadow ray each, if they are few.
+    /// The irradiance of all lights, by one shadow ray each; `None` if they are many.
     pub fn each(&self, scene: &Hierarchy, at: [DVec3; 2], random: &mut Random) -> Option<DVec3> {
-        let few = self.near.is_none();
+        let few = self.grid.is_none();
         few.then(|| self.lights.iter().map(|light| light.irradiance(scene, at, random)).sum())
     }
 
-    /// Whether a second shadow ray of the same place may see something else.
-    pub fn are_sized(&self) -> bool {
+    /// Whether any light has a size, so that shadow rays from the same point to it may differ.
+    pub fn have_size(&self) -> bool {
         self.lights.iter().any(|light| matches!(light.place, Place::Towards(_, angle) if angle > 0.0))
     }
 
-    /// By what each gives at a place where nothing stands in the way.
+    /// A distribution over the lights by their unshadowed irradiance at a point.
     pub fn choice_for(&self, at: [DVec3; 2]) -> Choice {
         Choice::new(self.lights.iter().map(|light| light.unshadowed(at).element_sum()))
     }
 
-    /// One of a choice.
+    /// Estimates the irradiance by one light, chosen from the distribution.
     pub fn chosen(&self, scene: &Hierarchy, at: [DVec3; 2], choice: &Choice, number: f64) -> DVec3 {
         let Some((index, probability, _)) = choice.pick(number) else { return DVec3::ZERO };
         self.lights[index].irradiance(scene, at, &mut Random::new(index as u64)) / probability
     }
 
-    /// One of them: of few by what each gives unhidden, of many by what a few candidates give.
+    /// Estimates the irradiance by one shadow ray. The light is chosen by its unshadowed irradiance: among all lights
+    /// if they are few, otherwise among a few candidates.
     pub fn one(&self, scene: &Hierarchy, at: [DVec3; 2], random: &mut Random) -> DVec3 {
         let number = random.uniform();
-        let Some(choice) = self.near.as_ref().and_then(|near| near.at(at[0])) else {
+        let Some(choice) = self.grid.as_ref().and_then(|grid| grid.at(at[0])) else {
             if self.lights.is_empty() {
                 return DVec3::ZERO;
             }
@@ -105,10 +109,10 @@ impl PunctualLights {
             *candidate = (light, self.lights[light].unshadowed(at).element_sum() / probability);
         }
         let sum: f64 = candidates.iter().map(|(_, weight)| weight).sum();
-        let mut left = random.uniform() * sum;
+        let mut remaining = random.uniform() * sum;
         for (light, weight) in candidates {
-            left -= weight;
-            if left < 0.0 {
+            remaining -= weight;
+            if remaining < 0.0 {
                 let light = &self.lights[light];
                 let share = sum / (light.unshadowed(at).element_sum() * CANDIDATES as f64);
                 return light.irradiance(scene, at, random) * share;
@@ -124,7 +128,7 @@ impl Punctual {
             Place::At(place, range) => {
                 let towards = place - origin;
                 let squared = towards.length_squared();
-                // The window of KHR_lights_punctual.
+                // The range attenuation recommended by KHR_lights_punctual.
                 let window = (1.0 - (squared / (range * range)).powi(2)).clamp(0.0, 1.0);
                 self.strength * (window * normal.dot(towards).max(0.0) / (squared * squared.sqrt()))
             }

@@ -1,11 +1,12 @@
-//! Directions chosen evenly over a triangle as it is seen from a point (Arvo, "Stratified Sampling of Spherical Triangles", 1995). Not
-//! points of its plane.
+//! Samples directions uniformly over the solid angle of a triangle (Arvo, "Stratified Sampling of Spherical Triangles",
+//! 1995).
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-/// A direction and the solid angle of all; `None` for a triangle that is seen from its side, or hardly at all.
+/// Returns a direction and the solid angle of the triangle, or `None` if that is too small (a triangle seen edge-on or
+/// from far away) or not below 2π.
 pub fn sample(origin: DVec3, corners: [DVec3; 3], [u, v]: [f64; 2]) -> Option<(DVec3, f64)> {
     let [a, b, c] = corners.map(|corner| (corner - origin).normalize());
     let angle = |at: DVec3, p: DVec3, q: DVec3| {

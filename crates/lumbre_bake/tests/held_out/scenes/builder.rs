@@ -1,4 +1,4 @@
-//! Puts blocks, furniture and lights into a world, at any scale. Not a scene of its own.
+//! Adds blocks, furniture, lights and a camera to a world at any scale. The scenes are in the other modules.
 
 use std::sync::Arc;
 
@@ -10,6 +10,7 @@ use lumbre_scene::{ActiveCamera, Camera, Mesh, Name, Projection, SceneSettings, 
 
 use super::region::Region;
 
+/// Builds a world. Coordinates are in metres at scale 1 and are multiplied by the scale.
 pub struct Builder {
     pub world: World,
     pub scale: f64,
@@ -18,6 +19,13 @@ pub struct Builder {
 pub fn matt(reflectance: [f32; 3], emission: [f32; 3]) -> Material {
     let front = Surface { diffuse: reflectance.into(), emission: emission.into(), ..Surface::default() };
     Material { front, ..Material::default() }
+}
+
+/// Turns a mesh inside out. (`common::shapes` has the same function; examples include the scenes without that module.)
+pub fn inside_out(mut mesh: TriangleMesh) -> TriangleMesh {
+    mesh.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
+    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    mesh
 }
 
 pub const WHITE: [f32; 3] = [0.72, 0.7, 0.66];
@@ -43,38 +51,38 @@ impl Builder {
         self.mesh(name, mesh, matt(color, NONE), (low + high) / 2.0, turn);
     }
 
-    /// A box that shines.
+    /// An emissive box.
     pub fn lamp(&mut self, name: &str, low: [f64; 3], high: [f64; 3], radiance: [f32; 3]) {
         let (low, high) = (DVec3::from(low), DVec3::from(high));
         let mesh = shapes::cuboid(((high - low) * self.scale).as_vec3(), 1);
         self.mesh(name, mesh, matt([0.5; 3], radiance), (low + high) / 2.0, 0.0);
     }
 
-    /// A box without its lowest face, for what stands on the ground: the sky of the baker is below it, too.
+    /// A box without its bottom face, for objects that stand on the ground. The bottom would be lit by the baker's sky,
+    /// which also lies below the horizon.
     pub fn standing(&mut self, name: &str, low: [f64; 3], high: [f64; 3], color: [f32; 3]) {
         let (low, high) = (DVec3::from(low), DVec3::from(high));
         let mut mesh = shapes::cuboid(((high - low) * self.scale).as_vec3(), 1);
-        let kept = mesh.indices.chunks_exact(3).filter(|t| mesh.normals[t[0] as usize].y > -0.5);
-        mesh.indices = kept.flatten().copied().collect();
+        let without_bottom = mesh.indices.chunks_exact(3).filter(|t| mesh.normals[t[0] as usize].y > -0.5);
+        mesh.indices = without_bottom.flatten().copied().collect();
         self.mesh(name, mesh, matt(color, NONE), (low + high) / 2.0, 0.0);
     }
 
-    /// The inside of a box.
+    /// A box seen from inside.
     pub fn shell(&mut self, name: &str, low: [f64; 3], high: [f64; 3], color: [f32; 3]) {
         let (low, high) = (DVec3::from(low), DVec3::from(high));
-        let mut mesh = shapes::cuboid(((high - low) * self.scale).as_vec3(), 1);
-        mesh.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
-        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+        let mesh = inside_out(shapes::cuboid(((high - low) * self.scale).as_vec3(), 1));
         self.mesh(name, mesh, matt(color, NONE), (low + high) / 2.0, 0.0);
     }
 
+    /// A point light; its intensity grows with the square of the scale, so that the irradiance stays the same.
     pub fn point_light(&mut self, at: [f64; 3], color: [f32; 3]) {
         let strength = (self.scale * self.scale) as f32;
         let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::from(color) * strength) };
         self.world.spawn((light, Transform::from_translation(DVec3::from(at) * self.scale)));
     }
 
-    /// A table: a board on four legs.
+    /// A table with four legs.
     pub fn table(&mut self, x: f64, z: f64, turn: f64) {
         self.mesh_at_turn("table board", [1.2, 0.04, 0.7], [x, 0.73, z], turn, [0.0; 3]);
         for (dx, dz) in [(-0.55, -0.3), (0.55, -0.3), (-0.55, 0.3), (0.55, 0.3)] {
@@ -82,13 +90,14 @@ impl Builder {
         }
     }
 
+    /// A wooden box at the position `off` relative to `at`, rotated together with that offset about the vertical axis.
     pub fn mesh_at_turn(&mut self, name: &str, size: [f64; 3], at: [f64; 3], turn: f64, off: [f64; 3]) {
         let mesh = shapes::cuboid((DVec3::from(size) * self.scale).as_vec3(), 1);
         let at = DVec3::from(at) + DQuat::from_rotation_y(turn) * DVec3::from(off);
         self.mesh(name, mesh, matt(WOOD, NONE), at, turn);
     }
 
-    /// Six boards around a place that no light reaches.
+    /// A closed cupboard of six boards; no light reaches its inside.
     pub fn closed_cupboard(&mut self, low: [f64; 3], high: [f64; 3]) {
         const BOARD: f64 = 0.02;
         let ([x0, y0, z0], [x1, y1, z1]) = (low, high);
@@ -102,7 +111,7 @@ impl Builder {
         self.block("cupboard door", [x0, y0, z1 - BOARD], [x1, y1, z1], WOOD, 0.0);
     }
 
-    /// A light from far away that travels along a direction, of an irradiance at right angles to it.
+    /// A directional light that travels along a direction and gives this irradiance to a surface perpendicular to it.
     pub fn sun(&mut self, along: DVec3, irradiance: [f32; 3]) {
         let color = Vec3::from(irradiance) / std::f32::consts::PI;
         let light = Light { bake: BakeMode::Static, ..Light::directional(color) };
@@ -115,7 +124,7 @@ impl Builder {
         self.world.insert_resource(SceneSettings { sky, background: sky, ..SceneSettings::default() });
     }
 
-    /// Where a player stands and looks to.
+    /// The active camera, with the view of a player.
     pub fn camera(&mut self, at: [f64; 3], target: [f64; 3]) {
         let place = Transform::from_translation(DVec3::from(at) * self.scale)
             .looking_at(DVec3::from(target) * self.scale, DVec3::Y);
@@ -129,7 +138,8 @@ impl Builder {
         ));
     }
 
-    /// What is looked at, and the rectangles (a corner and two edges) through which most of its light comes.
+    /// The region that a player sees, and the rectangles (a corner and two edges) through which most of its light
+    /// enters.
     pub fn region(&mut self, low: [f64; 3], high: [f64; 3], openings: &[[[f64; 3]; 3]]) {
         let scaled = |point: [f64; 3]| DVec3::from(point) * self.scale;
         let openings = openings.iter().map(|opening| opening.map(scaled)).collect();

@@ -1,11 +1,13 @@
-//! Rooms cut out of solid ground: of boxes that may overlap, the faces where what is cut out ends. Not walls of slabs.
+//! Rooms carved out of a solid: the surface of a union of boxes, seen from inside. Walls with a thickness are in
+//! `wall`.
 
 use glam::DVec3;
 use lumbre_mesh::TriangleMesh;
 
 use super::builder::{Builder, NONE, matt};
 
-/// Cuts boxes out and lines them: floors, walls and ceilings are an object each. Nothing covers what ends at the height `open`.
+/// Adds the surfaces of the carved-out boxes as three objects: all floors, all walls, and all ceilings. Ceilings at the
+/// height `open` are left out.
 pub fn carve(b: &mut Builder, voids: &[[[f64; 3]; 2]], colors: [[f32; 3]; 3], open: Option<f64>) {
     let grid: [Vec<f64>; 3] = std::array::from_fn(|axis| {
         let mut lines: Vec<f64> = voids.iter().flat_map(|ends| ends.map(|end| end[axis])).collect();
@@ -15,7 +17,7 @@ pub fn carve(b: &mut Builder, voids: &[[[f64; 3]; 2]], colors: [[f32; 3]; 3], op
     });
     let empty = |cell: [usize; 3]| {
         let middle = |axis: usize| {
-            // Before the first line and behind the last one there is solid ground.
+            // Before the first and behind the last grid line everything is solid.
             let (at, lines) = (cell[axis], &grid[axis]);
             (at > 0 && at < lines.len()).then(|| (lines[at - 1] + lines[at]) / 2.0)
         };
@@ -68,22 +70,23 @@ pub fn carve(b: &mut Builder, voids: &[[[f64; 3]; 2]], colors: [[f32; 3]; 3], op
     }
 }
 
-/// Covers the cells (from 1) that show by rectangles, each as long and then as wide as it may be: first and last line of both directions.
+/// Covers the cells for which `shows` is true (their indices begin at 1) with rectangles, each as long as possible and
+/// then as wide as possible. A rectangle is given by its first and last grid lines: column, row, column, row.
 fn rectangles(columns: usize, rows: usize, shows: impl Fn(usize, usize) -> bool) -> Vec<[usize; 4]> {
-    let mut left: Vec<Vec<bool>> =
+    let mut uncovered: Vec<Vec<bool>> =
         (0..=rows).map(|j| (0..=columns).map(|i| i > 0 && j > 0 && shows(i, j)).collect()).collect();
-    let mut found = Vec::new();
+    let mut rectangles = Vec::new();
     for j in 1..=rows {
         for i in 1..=columns {
-            if !left[j][i] {
+            if !uncovered[j][i] {
                 continue;
             }
-            let end = (i..=columns).find(|&k| !left[j][k]).unwrap_or(columns + 1);
+            let end = (i..=columns).find(|&k| !uncovered[j][k]).unwrap_or(columns + 1);
             let whole = |row: &Vec<bool>| row[i..end].iter().all(|&cell| cell);
-            let last = (j..=rows).find(|&l| !whole(&left[l])).unwrap_or(rows + 1);
-            left[j..last].iter_mut().for_each(|row| row[i..end].fill(false));
-            found.push([i - 1, j - 1, end - 1, last - 1]);
+            let last = (j..=rows).find(|&l| !whole(&uncovered[l])).unwrap_or(rows + 1);
+            uncovered[j..last].iter_mut().for_each(|row| row[i..end].fill(false));
+            rectangles.push([i - 1, j - 1, end - 1, last - 1]);
         }
     }
-    found
+    rectangles
 }

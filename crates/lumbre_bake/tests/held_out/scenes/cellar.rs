@@ -1,4 +1,5 @@
-//! A cellar that is lit through its stairs only, and a corridor behind it that sees none of what lights it. Not the corridor with a lamp.
+//! A cellar that is lit only through its stairs, and a corridor behind it from which no lit surface is visible
+//! directly.
 
 use bevy_ecs::world::World;
 use glam::DVec3;
@@ -8,7 +9,8 @@ use super::builder::{Builder, CLAY, WHITE, WOOD};
 use super::carved::carve;
 use super::furniture::{paint, shelf};
 
-/// From a bright room (even layouts) or a yard under the sky (odd ones) a door leads down six steps. Behind the cellar a corridor turns twice.
+/// A door and six steps lead down from a bright room (even layouts) or from a yard under the sky (odd ones). The
+/// corridor behind the cellar turns twice.
 pub fn cellar(layout: u64, scale: f64) -> World {
     let mut random = Random::new(3000 + layout);
     let mut b = Builder::new(scale);
@@ -43,7 +45,7 @@ pub fn cellar(layout: u64, scale: f64) -> World {
     shelf(&mut b, -3.9, 0.0, 1.0, 4);
     if yard {
         b.sky([0.55, 0.8, 1.25]);
-        // Into the door, past the yard's edge.
+        // The sun shines over the yard's edge into the door.
         b.sun(DVec3::new(1.0, -1.0, random.between(-0.2, 0.2)), [23.0, 20.0, 16.0]);
     } else {
         b.lamp("lamp", [-2.6, 2.64, 1.6], [-1.8, 2.7, 2.4], [40.0, 36.0, 28.0]);

@@ -1,4 +1,5 @@
-//! A corridor with two corners and one lamp at an end: behind the second corner there is light of bounces of bounces only. Not the cellar.
+//! A corridor with two corners and one lamp at an end: behind the second corner, only light of two and more bounces
+//! arrives.
 
 use bevy_ecs::world::World;
 
@@ -8,7 +9,8 @@ use super::carved::carve;
 use super::furniture::paint;
 use super::revolution::revolution;
 
-/// Three legs of 1.6 by 2.4 metres: a Z in even layouts, a U in odd ones. Under the ceiling a box shines, or a bulb.
+/// Three legs, 1.6 m wide and 2.4 m high, with the shape of a Z in even layouts and a U in odd ones. The lamp under the
+/// ceiling is a box in the former and a bulb in the latter.
 pub fn corridor(layout: u64, scale: f64) -> World {
     let mut random = Random::new(4000 + layout);
     let mut b = Builder::new(scale);

@@ -1,4 +1,4 @@
-//! What stands in rooms: chairs, shelves, vases, pictures. Tables and cupboards are the builder's own.
+//! Furniture: chairs, shelves, books, vases, pictures. Tables and cupboards are methods of the builder.
 
 use glam::DVec3;
 
@@ -6,7 +6,7 @@ use super::super::random::Random;
 use super::builder::{Builder, CLAY, GREEN, NONE, WHITE, WOOD, matt};
 use super::revolution::revolution;
 
-/// A colour of paint: bright, or strong.
+/// A random colour of paint.
 pub fn paint(random: &mut Random) -> [f32; 3] {
     let colors = [
         WHITE,
@@ -21,7 +21,7 @@ pub fn paint(random: &mut Random) -> [f32; 3] {
     colors[(random.next() % 8) as usize]
 }
 
-/// A seat and its back on four legs.
+/// A chair with four legs.
 pub fn chair(b: &mut Builder, x: f64, z: f64, turn: f64) {
     b.mesh_at_turn("chair seat", [0.44, 0.04, 0.44], [x, 0.45, z], turn, [0.0; 3]);
     for (dx, dz) in [(-0.19, -0.19), (0.19, -0.19), (-0.19, 0.19), (0.19, 0.19)] {
@@ -30,7 +30,7 @@ pub fn chair(b: &mut Builder, x: f64, z: f64, turn: f64) {
     b.mesh_at_turn("chair back", [0.44, 0.4, 0.03], [x, 0.67, z], turn, [0.0, 0.0, -0.205]);
 }
 
-/// Boards between two sides, open to +z, its back at z.
+/// A shelf that is open towards +z and has its back at z.
 pub fn shelf(b: &mut Builder, x: f64, z: f64, width: f64, boards: u32) {
     const BOARD: f64 = 0.025;
     let (height, depth) = (1.8, 0.32);
@@ -44,7 +44,7 @@ pub fn shelf(b: &mut Builder, x: f64, z: f64, width: f64, boards: u32) {
     }
 }
 
-/// Books on a board: thin blocks of several heights.
+/// A row of books: thin blocks of random size.
 pub fn books(b: &mut Builder, low: [f64; 3], count: u32, random: &mut Random) {
     let mut x = low[0];
     for _ in 0..count {
@@ -55,11 +55,11 @@ pub fn books(b: &mut Builder, low: [f64; 3], count: u32, random: &mut Random) {
     }
 }
 
-/// A closed vase of some hundred triangles that stands at a place.
+/// A closed vase of several hundred triangles.
 pub fn vase(b: &mut Builder, at: [f64; 3], color: [f32; 3]) {
     let (size, segments, rings) = (b.scale, 20, 14);
     let profile = |t: f64| {
-        // Up the outside, then a lid.
+        // The profile goes up the outside; the radius falls to 0 at both ends, which closes the vase.
         let radius = 0.05 + 0.045 * (4.6 * t + 0.4).sin() * (1.0 - 0.3 * t);
         let closed = (t * 40.0).min((1.0 - t) * 40.0).min(1.0);
         [radius * closed * size, 0.3 * t * size]
@@ -67,7 +67,7 @@ pub fn vase(b: &mut Builder, at: [f64; 3], color: [f32; 3]) {
     b.mesh("vase", revolution(profile, segments, rings), matt(color, NONE), DVec3::from(at), 0.0);
 }
 
-/// A picture in a frame on a wall that faces +z.
+/// A framed picture on a wall that faces +z.
 pub fn picture(b: &mut Builder, middle: [f64; 3], [width, height]: [f64; 2], color: [f32; 3]) {
     let [x, y, z] = middle;
     let (w, h) = (width / 2.0, height / 2.0);

@@ -1,4 +1,4 @@
-//! A lamp behind many thin bars: direct light is a comb of soft shadows. Not the corridor.
+//! A lamp behind many thin bars, whose soft shadows overlap.
 
 use bevy_ecs::world::World;
 
@@ -7,7 +7,8 @@ use super::builder::{Builder, CLAY, WHITE, WOOD};
 use super::carved::carve;
 use super::furniture::{chair, paint, picture};
 
-/// A room of 4 by 4 by 2.6 metres whose lamp shines through a grille: from a shaft in the ceiling (even layouts), or from a cage on the wall.
+/// A room of 4 by 4 by 2.6 m whose lamp is in a shaft of the ceiling (even layouts) or in a cage on the wall (odd
+/// ones), behind a grille.
 pub fn grille(layout: u64, scale: f64) -> World {
     let mut random = Random::new(5000 + layout);
     let mut b = Builder::new(scale);

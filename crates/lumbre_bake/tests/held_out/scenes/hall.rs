@@ -1,4 +1,4 @@
-//! A hall with columns under point lights. Not the rooms.
+//! A hall with columns under point lights.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use lumbre_mesh::TriangleMesh;
 use super::super::random::Random;
 use super::builder::{Builder, CLAY, GREEN, NONE, WHITE, WOOD, matt};
 
-/// A prism of flat sides that stands on the floor.
+/// A prism with flat sides and regular polygons as its ends, about the y axis.
 fn prism(radius: f64, height: f64, sides: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let corner = |i: u32| {
@@ -36,8 +36,8 @@ fn prism(radius: f64, height: f64, sides: u32) -> TriangleMesh {
     mesh
 }
 
-/// A hall of 12 by 8 by 4 metres with columns (of eight sides in even layouts, of twenty in odd ones) on square feet, and point lights
-/// only, baked whole.
+/// A hall of 12 by 8 by 4 m with columns on square feet (of 8 sides in even layouts, of 20 in odd ones). It is lit by
+/// point lights only, which are entirely baked.
 pub fn hall(layout: u64, scale: f64) -> World {
     let mut random = Random::new(1000 + layout);
     let mut b = Builder::new(scale);

@@ -1,5 +1,5 @@
-//! One furnished room under any number of lamps of the same power in all: emissive squares, point lights, a bulb of very many triangles. Not
-//! the screen.
+//! A furnished room under any number of lamps of the same total power: emissive squares, point lights, or a bulb of
+//! many triangles.
 
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2};
@@ -12,11 +12,11 @@ use super::furniture::{chair, paint, picture, shelf, vase};
 use super::revolution::revolution;
 
 const SIZE: [f64; 3] = [8.0, 3.0, 6.0];
-/// All squares together, m², and what they shine with.
+/// The total area of the emissive squares in m², and their radiance.
 const AREA: f64 = 0.64;
 const RADIANCE: [f32; 3] = [14.0, 12.0, 9.5];
 
-/// The room without a lamp: 8 by 6 by 3 metres, the same in all.
+/// The room without lamps, 8 by 6 by 3 m; all scenes of this module and the screen's share it.
 pub fn furnished(scale: f64) -> Builder {
     let mut random = Random::new(7000);
     let mut b = Builder::new(scale);
@@ -37,13 +37,14 @@ pub fn furnished(scale: f64) -> Builder {
     b
 }
 
-/// Two coordinates in [0, 1) that fill the square evenly (Martin Roberts' R2 sequence), and a third at random.
+/// Two coordinates in [0, 1) that fill the square evenly (Martin Roberts' R2 sequence), and a third that is random.
 fn spread(index: u64, random: &mut Random) -> [f64; 3] {
     let at = |step: f64| (0.5 + step * index as f64).fract();
     [at(0.754_877_666_246_693), at(0.569_840_290_998_053), random.uniform()]
 }
 
-/// So many squares: a third each under the ceiling, on the walls and hanging in the room, as one object each.
+/// The room with `count` emissive squares: a third each below the ceiling, on the walls, and free in the room. Each
+/// third is one object.
 pub fn lamps(count: u64, scale: f64) -> World {
     let mut b = furnished(scale);
     let mut random = Random::new(7100);
@@ -101,7 +102,7 @@ fn push_square(mesh: &mut TriangleMesh, at: DVec3, normal: DVec3, half: f64) {
     mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|vertex| first + vertex));
 }
 
-/// So many point lights in the upper half of the room.
+/// The room with `count` point lights in its upper half.
 pub fn points(count: u64, scale: f64) -> World {
     let mut b = furnished(scale);
     let mut random = Random::new(7200);
@@ -114,16 +115,16 @@ pub fn points(count: u64, scale: f64) -> World {
     b.world
 }
 
-/// One bulb of about so many triangles, all of them smooth.
+/// The room with one smooth bulb of about this many triangles.
 pub fn bulb(triangles: u64, scale: f64) -> World {
     let mut b = furnished(scale);
     let segments = ((triangles as f64 / 1.75).sqrt()).round().max(8.0) as u32;
-    // The rings at both ends have one triangle a segment.
+    // The rings at both ends have only one triangle per segment.
     let rings = (triangles as f64 / (2.0 * f64::from(segments)) + 1.0).round().max(4.0) as u32;
     let size = 0.1 * b.scale;
     let profile = |t: f64| {
         let angle = std::f64::consts::PI * t;
-        // A globe that narrows to its thread.
+        // A globe that narrows towards its thread.
         let narrow = 1.0 - 0.55 * ((t - 0.55) / 0.3).clamp(0.0, 1.0);
         let radius = if t > 0.0 && t < 1.0 { size * angle.sin().max(0.0) * narrow } else { 0.0 };
         [radius, -size * angle.cos() * 1.3]

@@ -1,5 +1,6 @@
-//! Scenes that the baker was not tuned on, without lightmap coordinates, each by its kind and a number, at any scale. Irradiance is the
-//! same at every scale: radiance stays, a point light's intensity grows with the square.
+//! Scenes that the baker was not tuned on, without lightmap coordinates. A scene is built by its kind, a layout number
+//! and a scale. The irradiance is the same at every scale: radiance is constant, and the intensity of point lights
+//! grows with the square of the scale.
 
 mod builder;
 mod carved;
@@ -23,13 +24,13 @@ pub use hall::hall;
 pub use rooms::rooms;
 pub use sunlit_room::sunlit_room;
 
-/// What builds a scene, by layout and scale.
+/// A function that builds a scene of a given layout and scale.
 pub type Build = fn(u64, f64) -> World;
 
-/// A name, what builds it, and its layout.
+/// The name of a scene, the function that builds it, and its layout.
 pub type Named = (&'static str, Build, u64);
 
-/// Those that are judged at several scales.
+/// The scenes that are baked at several scales.
 pub fn of_any_scale() -> [Named; 6] {
     [
         ("rooms_0", rooms, 0),
@@ -41,7 +42,7 @@ pub fn of_any_scale() -> [Named; 6] {
     ]
 }
 
-/// Levels in which most of what is looked at is far darker than what lights it.
+/// Levels in which most visible surfaces are far darker than those that light them.
 pub fn levels() -> [Named; 12] {
     [
         ("sunlit_room_0", sunlit_room, 0),
@@ -59,7 +60,7 @@ pub fn levels() -> [Named; 12] {
     ]
 }
 
-/// One room under few and many lamps; their number stands for the layout.
+/// One room under few and many lamps; the layout is the number of lamps, triangles or texels.
 pub fn many_lamps() -> [Named; 12] {
     [
         ("lamps_1", lamps::lamps, 1),
@@ -77,12 +78,12 @@ pub fn many_lamps() -> [Named; 12] {
     ]
 }
 
-/// Every kind, in the layouts that are named somewhere.
+/// All scenes of the lists above.
 pub fn all() -> Vec<Named> {
     of_any_scale().into_iter().chain(levels()).chain(many_lamps()).collect()
 }
 
-/// A scene of any layout by its name: of those above, or `KIND_N`.
+/// Finds a scene by its name: one of the lists above, or `KIND_N` with any layout N.
 pub fn find(name: &str) -> Option<(Build, u64)> {
     if let Some((_, build, layout)) = all().into_iter().find(|(known, ..)| *known == name) {
         return Some((build, layout));

@@ -1,11 +1,12 @@
-//! The part of a level that is looked at, and the openings that light comes in through. Not its geometry.
+//! The part of a level that a player sees, and the openings through which light enters it.
 
-#![allow(dead_code, reason = "what only builds the scenes reads none of it")]
+#![allow(dead_code, reason = "programs that only build the scenes do not read it")]
 
 use bevy_ecs::resource::Resource;
 use glam::DVec3;
 
-/// An axis-aligned box of the world, and rectangles (a corner and two edges) that guide paths to the light: windows, doors.
+/// An axis-aligned box in world space, and rectangles (a corner and two edges), such as windows and doors, towards
+/// which paths are guided.
 #[derive(Resource, Clone, Debug)]
 pub struct Region {
     pub low: DVec3,
@@ -14,7 +15,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// Whether a point is in the box or on its sides.
+    /// Whether a point is inside the box or on its faces.
     pub fn holds(&self, point: DVec3) -> bool {
         let slack = 1e-4 * (self.high - self.low).max_element();
         point.cmpge(self.low - slack).all() && point.cmple(self.high + slack).all()

@@ -1,12 +1,13 @@
-//! Smooth surfaces of revolution about the vertical axis, by their profile: vases, bulbs. Not prisms.
+//! Smooth surfaces of revolution about the vertical axis, for vases and bulbs.
 
 use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec2};
 use lumbre_mesh::TriangleMesh;
 
-/// `profile` gives radius and height from 0 (the lower end) to 1; where the radius is 0 the surface closes: 2 · segments · rings triangles
-/// less one ring's half for each closed end. It faces outward where the height grows.
+/// Builds the surface from a profile, which gives the radius and the height for a parameter from 0 (the lower end) to
+/// 1. An end with a radius of 0 is closed. The mesh has 2 · segments · rings triangles, minus `segments` for each
+/// closed end. It faces outwards where the height grows.
 pub fn revolution(profile: impl Fn(f64) -> [f64; 2], segments: u32, rings: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for ring in 0..=rings {

@@ -1,4 +1,4 @@
-//! A room lit by a picture on its wall: an emissive texture of high contrast. Not lamps of one radiance.
+//! A room lit by a screen on its wall: an emissive texture of high contrast.
 
 use std::sync::Arc;
 
@@ -10,14 +10,15 @@ use lumbre_scene::{Image, MaterialTextures, Mesh, Name, Sampler, StaticObject, T
 use super::builder::matt;
 use super::lamps::furnished;
 
-/// The furnished room of the many lamps and a screen of 3.2 by 1.6 metres with so many texels along its width and half as many along its height.
+/// The furnished room of `lamps` with a screen of 3.2 by 1.6 m that has `texels` along its width and half as many along
+/// its height.
 pub fn screen(texels: u64, scale: f64) -> World {
     let mut b = furnished(scale);
     let (width, height) = (texels.max(2) as u32, (texels / 2).max(1) as u32);
     let (high, deep) = (1.6, 3.2);
     let corner = DVec3::new(0.03, 0.9, 1.4);
     b.block("screen's back", [0.0, 0.88, 1.38], [0.029, 2.52, 4.62], [0.05; 3], 0.0);
-    // Seen from +x its left is at the greater z.
+    // Seen from +x, its left side is at the greater z.
     let at = |s: f64, t: f64| ((corner + DVec3::new(0.0, high * t, deep * (1.0 - s))) * scale).as_vec3();
     let mesh = TriangleMesh {
         positions: vec![at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)],
@@ -47,7 +48,7 @@ pub fn screen(texels: u64, scale: f64) -> World {
     b.world
 }
 
-/// Lines like text on black, a bright window, discs and a gradient: most of it is dark.
+/// An image with lines that look like text, a window with a gradient, and discs; most of it is dark.
 fn pixels(width: u32, height: u32) -> Vec<u8> {
     let mut rgba = Vec::with_capacity(4 * (width * height) as usize);
     for y in 0..height {

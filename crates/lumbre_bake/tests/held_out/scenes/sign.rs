@@ -1,4 +1,4 @@
-//! A room lit by a sign of nine glowing boxes on its wall. Not many lamps.
+//! A room lit by a sign of nine emissive boxes on its wall.
 
 use bevy_ecs::world::World;
 
@@ -7,7 +7,7 @@ use super::builder::{Builder, CLAY, WHITE, WOOD};
 use super::carved::carve;
 use super::furniture::{chair, paint, shelf, vase};
 
-/// Strokes of three letters, three each: from and to, in tenths of a letter's height.
+/// The strokes of three letters, three each: two opposite corners in tenths of a letter's height.
 const STROKES: [[[f64; 2]; 2]; 9] = [
     [[0.0, 0.0], [1.0, 10.0]],
     [[1.2, 0.0], [5.0, 1.0]],
@@ -20,7 +20,7 @@ const STROKES: [[[f64; 2]; 2]; 9] = [
     [[15.2, 0.0], [19.0, 1.0]],
 ];
 
-/// A room of 5 by 4 by 2.8 metres. The boxes lie against the wall: their backs are hidden.
+/// A room of 5 by 4 by 2.8 m. The backs of the boxes lie against the wall and are hidden.
 pub fn sign(layout: u64, scale: f64) -> World {
     let mut random = Random::new(6000 + layout);
     let mut b = Builder::new(scale);

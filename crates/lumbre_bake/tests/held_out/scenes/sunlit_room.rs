@@ -1,4 +1,4 @@
-//! A furnished room with windows on a sunny day: outside is ten to thirty times as bright as inside. Not the rooms with a lamp.
+//! A furnished room with windows on a sunny day: the outside is ten to thirty times as bright as the inside.
 
 use bevy_ecs::world::World;
 use glam::DVec3;
@@ -13,8 +13,8 @@ const DEPTH: f64 = 4.0;
 const HEIGHT: f64 = 2.7;
 const THICK: f64 = 0.25;
 
-/// 5 by 4 by 2.7 metres. In even layouts the sun shines in through a window to the south; in odd ones it stands behind the house, a
-/// second window looks west, and a neighbour's wall is lit.
+/// A room of 5 by 4 by 2.7 m. In even layouts the sun shines in through a window to the south. In odd ones it is behind
+/// the house, there is a second window to the west, and the sun lights the wall of a neighbour's house.
 pub fn sunlit_room(layout: u64, scale: f64) -> World {
     let mut random = Random::new(2000 + layout);
     let mut b = Builder::new(scale);

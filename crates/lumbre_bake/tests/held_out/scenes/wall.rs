@@ -1,17 +1,16 @@
-//! A wall of slabs around its windows, with frames and sills. Not the room behind it.
+//! Walls with a thickness and windows, built of slabs, and the ground outside.
 
 use super::builder::{Builder, NONE, WHITE, matt};
 
-/// From along, to along, sill and lintel.
+/// A window: where it begins and ends along the wall, the height of its sill and of its lintel.
 pub type Opening = [f64; 4];
 
-/// Where a wall stands.
 pub struct Wall {
-    /// Along x, or else along z.
+    /// Whether the wall runs along x; otherwise it runs along z.
     pub along_x: bool,
-    /// Where it begins and ends.
+    /// The coordinates along the wall at which it begins and ends.
     pub ends: [f64; 2],
-    /// Its two faces.
+    /// The coordinates of its two faces across the wall.
     pub across: [f64; 2],
     pub height: f64,
     pub color: [f32; 3],
@@ -35,7 +34,7 @@ impl Wall {
         b.block(name, low, self.corner(to[0], to[1], across[1]), color, 0.0);
     }
 
-    /// Columns between the openings, sills and lintels, and a frame with a bar in each opening.
+    /// Adds the wall with its openings, and a window frame with a bar in each opening.
     pub fn build(&self, b: &mut Builder, openings: &[Opening]) {
         let mut from = self.ends[0];
         for &[begin, end, sill, lintel] in openings {
@@ -63,14 +62,14 @@ impl Wall {
         self.slab(b, "wall", [from, 0.0], [self.ends[1], self.height], self.across, self.color);
     }
 
-    /// The opening as a corner and two edges, in the middle of the wall.
+    /// The rectangle of an opening in the middle of the wall, as a corner and two edges.
     pub fn rectangle(&self, [begin, end, sill, lintel]: Opening) -> [[f64; 3]; 3] {
         let middle = (self.across[0] + self.across[1]) / 2.0;
         [self.corner(begin, sill, middle), self.corner(end - begin, 0.0, 0.0), [0.0, lintel - sill, 0.0]]
     }
 }
 
-/// A plane that faces up.
+/// Adds a horizontal plane that faces up.
 pub fn ground(b: &mut Builder, middle: [f64; 3], size: [f64; 2], color: [f32; 3]) {
     let [width, depth] = size.map(|side| (side * b.scale) as f32);
     let plane = lumbre_mesh::shapes::plane(width, depth, 1, 1);
