@@ -16,7 +16,7 @@ pub const ROWS: [(&str, &str); 13] = [
     ),
     (
         "patches sharing an edge: the gap to 0",
-        "Direct light is Lambert's polygon formula, which has no singularity. Between patches rays are held to the closed form, down to a shared edge: [form factors](../crates/lumbre_bake/src/transport/form_factor_tests.rs) `perpendicular_squares_down_to_a_shared_edge`, `parallel_squares`.",
+        "Direct light is Lambert's polygon formula, which has no singularity. Between patches rays are held to the closed form, down to a shared edge: [form factors](../crates/lumbre_bake/src/radiosity/form_factor_tests.rs) `perpendicular_squares_down_to_a_shared_edge`, `parallel_squares`.",
     ),
     (
         "coplanar faces, a lamp in the ceiling's plane, duplicate triangles",
@@ -28,11 +28,11 @@ pub const ROWS: [(&str, &str); 13] = [
     ),
     (
         "rho towards 1, rho above 1 in the file",
-        "Clamped to 0.999 with a warning; the report has the residual and residual / (1 - rho), a bound on the solution's error. Also [solver](../crates/lumbre_bake/src/transport/solver.rs) `furnace`, `iterations_stay_within_their_bounds`.",
+        "Clamped to 0.999 with a warning; the report has the residual and residual / (1 - rho), a bound on the solution's error. Also [solver](../crates/lumbre_bake/src/radiosity/solver.rs) `furnace`, `iterations_stay_within_their_bounds`.",
     ),
     (
         "row sums of Monte Carlo form factors above 1; reciprocity lost",
-        "Hits of both directions are pooled, so that A_i F_ij = A_j F_ji to the bit, and scaled alike for both until every row sums to what its patch sees. Also [form factors](../crates/lumbre_bake/src/transport/form_factor_tests.rs) `a_closed_room_is_reciprocal_and_its_rows_sum_to_one`.",
+        "Hits of both directions are pooled, so that A_i F_ij = A_j F_ji to the bit, and scaled alike for both until every row sums to what its patch sees. Also [form factors](../crates/lumbre_bake/src/radiosity/form_factor_tests.rs) `a_closed_room_is_reciprocal_and_its_rows_sum_to_one`.",
     ),
     (
         "tiny bright emitters (fireflies)",
@@ -40,7 +40,7 @@ pub const ROWS: [(&str, &str); 13] = [
     ),
     (
         "overlapping or out-of-range UVs; texels with no coverage; charts under a texel",
-        "The mesh is named and unwrapped anew; coverage is conservative, values are continued into the gap. Also [validation](../crates/lumbre_mesh/src/uv_validation.rs) `every_fault_names_its_triangles`, [atlas](../crates/lumbre_mesh/tests/atlas.rs) `no_overlap`, `the_check_sees_a_gap_that_is_too_small`, [unwrap](../crates/lumbre_mesh/tests/unwrap.rs) `triangles_without_area_share_a_spot`, [sizes](../crates/lumbre_bake/tests/bake/hard_cases_of_size.rs) `coordinates_out_of_range_and_overlapping_are_named_and_replaced`, `charts_below_a_texel_have_light`, and [filling](../crates/lumbre_bake/src/texels/fill.rs) `a_plane_is_continued_exactly_and_moved_to_the_centres`.",
+        "The mesh is named and unwrapped anew; coverage is conservative, values are continued into the gap. Also [validation](../crates/lumbre_mesh/src/uv_validation.rs) `every_fault_names_its_triangles`, [atlas](../crates/lumbre_mesh/tests/atlas.rs) `no_overlap`, `the_check_sees_a_gap_that_is_too_small`, [unwrap](../crates/lumbre_mesh/tests/unwrap.rs) `triangles_without_area_share_a_spot`, [sizes](../crates/lumbre_bake/tests/bake/hard_cases_of_size.rs) `coordinates_out_of_range_and_overlapping_are_named_and_replaced`, `charts_below_a_texel_have_light`, and [filling](../crates/lumbre_bake/src/probes/fill.rs) `a_plane_is_continued_exactly_and_moved_to_the_centres`.",
     ),
     (
         "sums over 10^8 samples, light ratios of 10^8; RGB9E5 saturates at 65408",
