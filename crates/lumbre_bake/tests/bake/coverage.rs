@@ -100,10 +100,17 @@ fn texels(world: &mut World) -> Vec<Texel> {
     found
 }
 
-/// Whether a place lies in the open, and not inside of what stands on its surface.
+/// Returns true if a place is in the open, and not inside something that stands on its surface. Rays that leave it at a
+/// slant must not meet the back of a face: along the normal they could meet the floor in whose plane the thing ends.
 fn is_open(tracer: &PathTracer, place: DVec3, normal: DVec3) -> bool {
-    let above = tracer.scene.closest(place + normal * tracer.offset, normal);
-    above.is_none_or(|hit| tracer.scene.triangles[hit.triangle].normal.dot(normal) < 0.0)
+    let origin = place + normal * tracer.offset;
+    [DVec3::new(0.31, 0.74, 0.23), DVec3::new(-0.52, 0.11, 0.67), DVec3::new(0.09, -0.63, -0.41)]
+        .into_iter()
+        .map(|slant| (normal + 0.9 * slant).normalize())
+        .all(|direction| {
+            let hit = tracer.scene.closest(origin, direction);
+            hit.is_none_or(|hit| tracer.scene.triangles[hit.triangle].normal.dot(direction) < 0.0)
+        })
 }
 
 /// How many of a scene's texels are judged, are within twice what they state, and would be if they stated half as much.
