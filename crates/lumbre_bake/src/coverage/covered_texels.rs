@@ -1,6 +1,7 @@
 //! The covered texels of all maps, with what is hidden taken out of their footprints. Not the light that they receive.
 
 use super::charts::charts;
+use super::contact_lines::ContactLines;
 use super::divided_texels::{crossed_texels, divided_texels};
 use super::footprint::{Texel, footprints};
 use super::hidden::remove_hidden;
@@ -17,6 +18,8 @@ pub(crate) struct CoveredTexels<'a> {
     pub charts: Vec<u32>,
     /// The texels that a thin wall divides (see `divided_texels`).
     pub divided: Vec<CoveredTexel>,
+    /// The lines along which other surfaces touch what the texels show.
+    pub contacts: ContactLines,
     /// Side length of a texel of mean area on its surface, canonical units.
     pub side: f32,
 }
@@ -53,7 +56,8 @@ impl<'a> CoveredTexels<'a> {
         report.texels = layout.texels;
         report.coverage = list.len() as f64 / layout.texels.max(1) as f64;
         let area: f64 = scene.triangles.iter().map(|triangle| f64::from(triangle.area)).sum();
+        let contacts = ContactLines::new(crossed);
         let side = (area / list.len().max(1) as f64).sqrt() as f32;
-        Ok(Self { layout, list, charts, divided, side })
+        Ok(Self { layout, list, charts, divided, contacts, side })
     }
 }

@@ -2,6 +2,7 @@
 //! there.
 
 pub(crate) mod charts;
+pub(crate) mod contact_lines;
 pub(crate) mod covered_texels;
 pub(crate) mod divided_texels;
 pub(crate) mod footprint;

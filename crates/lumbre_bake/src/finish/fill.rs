@@ -7,9 +7,10 @@ use glam::{DMat2, DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::cancel_token::CancelToken;
+use crate::coverage::contact_lines::ContactLines;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Footprint, Texel};
-use crate::scene::LightmapLayout;
+use crate::scene::{LightmapLayout, MapLayout};
 
 /// Added to the variance of the neighbours' positions along each axis, in square texels: where that is much smaller,
 /// the slope is unknown and taken as zero (ridge regression).
@@ -31,14 +32,17 @@ pub(crate) struct TexelValue {
 
 /// Fills one map from its known texels; `None` where no known texel is within reach. Values are continued `rings`
 /// texels out of the charts; into texels that other geometry hides, only where filtering reads them from a point in the
-/// open.
+/// open. A texel's own value is moved to its centre by neighbours on the same side of all `contacts` alone: what lies
+/// beyond a thin wall has other light.
 fn fill_map(
-    (width, height): (u32, u32),
+    map: &MapLayout,
     known: &[Option<TexelValue>],
+    contacts: &ContactLines,
     hidden: &[Hidden],
     rings: u32,
     stop: &CancelToken,
 ) -> Vec<Option<TexelValue>> {
+    let (width, height) = (map.width, map.height);
     // First the charts' own texels, moved to their centres.
     let mut current: Vec<Option<TexelValue>> = (0..known.len())
         .into_par_iter()
@@ -50,7 +54,9 @@ fn fill_map(
                 return Some(texel);
             }
             let (x, y) = (index as u32 % width, index as u32 / width);
-            let (value, variance) = extrapolate(width, height, known, x, y, texel.chart, true)
+            let middle = Vec2::new(x as f32, y as f32) + texel.middle;
+            let is_beside = |place: Vec2| !contacts.separate(map, [middle, place]);
+            let (value, variance) = extrapolate(map, known, (x, y), texel.chart, Some(&is_beside))
                 .unwrap_or((texel.value, texel.variance));
             Some(TexelValue { value, variance, middle: Vec2::splat(0.5), ..texel })
         })
@@ -69,7 +75,7 @@ fn fill_map(
                 }
                 let (x, y) = (index as u32 % width, index as u32 / width);
                 let chart = nearest_chart(width, height, &current, x, y)?;
-                let (value, variance) = extrapolate(width, height, &current, x, y, chart, false)?;
+                let (value, variance) = extrapolate(map, &current, (x, y), chart, None)?;
                 Some(TexelValue { value, variance, middle: Vec2::splat(0.5), chart })
             })
             .collect();
@@ -106,17 +112,16 @@ fn nearest_chart(width: u32, height: u32, known: &[Option<TexelValue>], x: u32, 
 
 /// The value at a texel's centre by a plane through the texels of a chart around it, fitted by weighted least squares
 /// and clamped to their range and a little more; and its squared error. For that the neighbours' errors are taken as
-/// independent or as all the same, whichever gives more, since smoothed texels are in between. The texel's own value
-/// takes part if `includes_itself`.
+/// independent or as all the same, whichever gives more, since smoothed texels are in between. With `is_beside` the
+/// texel's own value takes part, and of the others those at whose places it is true.
 fn extrapolate(
-    width: u32,
-    height: u32,
+    map: &MapLayout,
     known: &[Option<TexelValue>],
-    x: u32,
-    y: u32,
+    (x, y): (u32, u32),
     chart: u32,
-    includes_itself: bool,
+    is_beside: Option<&dyn Fn(Vec2) -> bool>,
 ) -> Option<(Vec3, f32)> {
+    let (width, height) = (map.width, map.height);
     let center = Vec2::new(x as f32, y as f32) + 0.5;
     let mut moments = [0.0f64; 6];
     let mut sums = [glam::DVec3::ZERO; 3];
@@ -128,13 +133,18 @@ fn extrapolate(
     let mut terms = [(0.0f64, DVec2::ZERO, 0.0f64); 25];
     let mut count = 0;
     for (nx, ny) in texels_within(width, height, x, y, 2) {
-        if !includes_itself && nx == x && ny == y {
+        let is_itself = nx == x && ny == y;
+        if is_itself && is_beside.is_none() {
             continue;
         }
         let Some(other) = known[(ny * width + nx) as usize].filter(|other| other.chart == chart) else {
             continue;
         };
-        let d = Vec2::new(nx as f32, ny as f32) + other.middle - center;
+        let place = Vec2::new(nx as f32, ny as f32) + other.middle;
+        if !is_itself && is_beside.is_some_and(|is_beside| !is_beside(place)) {
+            continue;
+        }
+        let d = place - center;
         let weight = f64::from((-0.7 * d.length_squared()).exp());
         terms[count] = (weight, d.as_dvec2(), f64::from(other.variance));
         count += 1;
@@ -200,7 +210,7 @@ pub(crate) fn fill(
     rings: u32,
     stop: &CancelToken,
 ) -> (Vec<Vec3>, Vec<f32>) {
-    let CoveredTexels { layout, list: texels, charts, .. } = texels;
+    let CoveredTexels { layout, list: texels, charts, contacts, .. } = texels;
     let mut known: Vec<Option<TexelValue>> = vec![None; layout.texels];
     for (texel, (&value, &variance)) in texels.iter().zip(values.iter().zip(variances)) {
         if !texel.is_hidden() {
@@ -213,7 +223,7 @@ pub(crate) fn fill(
     let mut errors = Vec::with_capacity(layout.texels);
     for map in &layout.maps {
         let known = &known[map.places()];
-        let map = fill_map((map.width, map.height), known, &hidden[map.places()], rings, stop);
+        let map = fill_map(map, known, contacts, &hidden[map.places()], rings, stop);
         filled.extend(map.iter().map(|texel| texel.map_or(Vec3::NAN, |texel| texel.value)));
         let error = |(texel, known): (&Option<TexelValue>, &Option<TexelValue>)| {
             texel.filter(|_| known.is_some()).map_or(f32::NAN, |texel| texel.variance)
@@ -253,7 +263,36 @@ fn hidden(layout: &LightmapLayout, texels: &[Texel], reach: u32) -> Vec<Hidden> 
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
+
+    fn map(side: u32) -> MapLayout {
+        MapLayout { width: side, height: side, ..MapLayout::default() }
+    }
+
+    /// A wall of three quarters of a texel stands along x = 3.5 to 4.25: what is bright on one side of it does not lighten
+    /// the texel that shows a part of the dark side.
+    #[test]
+    fn light_does_not_come_through_a_thin_wall() {
+        let map = map(8);
+        let known: Vec<Option<TexelValue>> = (0..64)
+            .map(|index| {
+                let x = index % 8;
+                let value = Vec3::splat(if x < 4 { 1.0 } else { 0.0 });
+                let middle = Vec2::new([0.5, 0.5, 0.5, 0.25, 0.625, 0.5, 0.5, 0.5][x], 0.5);
+                Some(TexelValue { value, variance: 0.0, middle, chart: 0 })
+            })
+            .collect();
+        let side = |x: f64| [DVec2::new(x, 0.0), DVec2::new(x, 1.0)];
+        let lines = (0..8).flat_map(|y| [(map.texel(3, y), side(0.5)), (map.texel(4, y), side(0.25))]);
+        let contacts = ContactLines::new(lines.collect());
+        let filled =
+            |contacts| fill_map(&map, &known, contacts, &[Hidden::No; 64], 1, &CancelToken::default());
+        let row = |contacts| filled(contacts)[32..40].iter().map(|v| v.unwrap().value.x).collect::<Vec<_>>();
+        assert_eq!(row(&contacts), [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!(row(&ContactLines::default())[4] > 0.1, "without the wall it would");
+    }
 
     #[test]
     fn a_plane_is_continued_exactly_and_moved_to_the_centres() {
@@ -267,7 +306,14 @@ mod tests {
                 known[(y * 8 + x) as usize] = Some(TexelValue { value, variance: 0.01, middle, chart: 0 });
             }
         }
-        let filled = fill_map((8, 8), &known, &[Hidden::No; 64], 1, &CancelToken::default());
+        let filled = fill_map(
+            &map(8),
+            &known,
+            &ContactLines::default(),
+            &[Hidden::No; 64],
+            1,
+            &CancelToken::default(),
+        );
         for y in 2..6u32 {
             for x in 1..7u32 {
                 let TexelValue { value, variance, .. } = filled[(y * 8 + x) as usize].unwrap();
@@ -298,7 +344,14 @@ mod tests {
                 Some(TexelValue { value: Vec3::splat(value), variance: 0.0, middle: Vec2::splat(0.5), chart })
             })
             .collect();
-        let filled = fill_map((4, 4), &known, &[Hidden::No; 16], 2, &CancelToken::default());
+        let filled = fill_map(
+            &map(4),
+            &known,
+            &ContactLines::default(),
+            &[Hidden::No; 16],
+            2,
+            &CancelToken::default(),
+        );
         for row in filled.chunks(4) {
             assert_eq!(row.iter().map(|v| v.unwrap().value.x).collect::<Vec<_>>(), [1.0, 1.0, 9.0, 9.0]);
         }

@@ -16,7 +16,7 @@ use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions, Density};
 
 /// The lightmap of one object.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct MapLayout {
     /// One mesh per primitive of the object, with lightmap coordinates in `uv1`.
     pub meshes: Vec<Arc<TriangleMesh>>,
