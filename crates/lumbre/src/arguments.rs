@@ -553,6 +553,12 @@ pub struct Frame {
     /// Draws no shadows: every light reaches everything.
     #[arg(long)]
     pub no_shadows: bool,
+    /// Every lamp casts a shadow, whether or not the file asks for one.
+    #[arg(long, conflicts_with = "no_shadows")]
+    pub every_shadow: bool,
+    /// Leaves an effect out that the scene calls for, as `lumbre explain` names it: "fog", say, or "polygon lights". May be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    pub without: Vec<String>,
     /// How often light is mirrored at most where it meets flat mirrors: 1 shows a mirror, 2 (the default) a mirror in a mirror; 0 leaves out what mirrors
     /// show.
     #[arg(long, value_name = "N")]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, has_light_to_bake};
 use lumbre_scene::{GlobalTransform, Lightmap, Mesh, StaticObject, hidden_entities};
 
 use crate::converged::Maps;
@@ -47,6 +47,22 @@ pub fn bake_arguments(options: &BakeOptions) -> String {
     };
     let patches = options.patch_texels.map_or_else(String::new, |texels| format!(" --patch-texels {texels}"));
     format!("--error {}{density}{patches} --probes never --no-resolution-error --no-reuse", options.error)
+}
+
+/// Why nothing of a scene can be baked, as a sentence; nothing where something can be.
+///
+/// # Errors
+/// [`CostError::Load`].
+pub fn nothing_to_bake(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Option<String>, CostError> {
+    let mut world = scene.open(conditions.aspect())?;
+    let name = &scene.name;
+    Ok(match (static_area(&mut world) > 0.0, has_light_to_bake(&mut world)) {
+        (true, true) => None,
+        (false, _) => Some(format!("Nothing of {name} is static, so that there is nothing to bake.")),
+        (_, false) => {
+            Some(format!("{name} has no light that is baked, no emission and no sky: its lightmaps would be black."))
+        }
+    })
 }
 
 /// Square metres of what is baked.

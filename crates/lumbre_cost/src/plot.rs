@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::fronts::pareto_front;
+use crate::fronts::front_of;
 use crate::{CostError, Plot, Point, Quantity, Study};
 
 /// How large a plot is drawn, in pixels: text keeps its size, so that phones get drawings of their own.
@@ -118,7 +118,10 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(
         .map_err(told)?;
     let onto = |(x, y): (f64, f64)| (x.max(across.from), y.max(up.from));
 
-    let front = if plot.front { pareto_front(points.iter().map(|(_, point, _)| *point)) } else { Vec::new() };
+    let front = match plot.front {
+        true => front_of(points.iter().map(|(_, point, _)| *point), |point| place(plot, point)),
+        false => Vec::new(),
+    };
     let corners: Vec<(f64, f64)> = front.iter().filter_map(|point| place(plot, point)).map(onto).collect();
     let steps: Vec<(f64, f64)> =
         corners.iter().zip(corners.iter().skip(1)).flat_map(|(a, b)| [*a, (b.0, a.1), *b]).collect();

@@ -83,6 +83,8 @@ pub fn measure(
             quick: options.quick,
             counts_only: options.counts_only,
             size: options.size,
+            size_of_report: options.size,
+            as_shown: false,
             seed: options.seed,
             folder: folder.path(),
             files: &options.files,

@@ -54,7 +54,8 @@ mod window;
 
 pub use adaptation::Adaptation;
 #[cfg(feature = "window")]
-pub use background_bake::{BackgroundBake, BakeError, BakeNews, BakeStatus, BakedLight, has_light_to_bake};
+pub use background_bake::{BackgroundBake, BakeError, BakeNews, BakeStatus, BakedLight};
+pub use lumbre_bake::has_light_to_bake;
 pub use clock::{LONGEST_FRAME, STEP_SECONDS};
 pub use game::{Game, GameError, START_CAMERA, Viewpoint};
 pub use input::{Action, Input};

@@ -1,5 +1,6 @@
 //! Scenes that studies make where none are given: each small, each for one question. Not their measuring.
 
+mod assorted_balls;
 mod ball;
 mod balls_and_lamps;
 mod fence;
@@ -8,10 +9,11 @@ mod room;
 mod scan;
 mod sheet;
 
+pub use assorted_balls::assorted_balls;
 pub use ball::{Ball, ball, exact_ball};
 pub use balls_and_lamps::{BallsAndLamps, balls_and_lamps};
 pub use fence::fence;
 pub use mirror_and_glass::mirror_and_glass;
-pub use room::{Air, room};
+pub use room::{Air, room, two_rooms};
 pub use scan::scan;
 pub use sheet::{Sheet, sheet};

@@ -8,7 +8,7 @@ use crate::findings::{is_above_one, listed, listed_with, percent, ratio_of, roun
 use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
-use crate::scene_file::SceneFile;
+use crate::scene_file::{SceneFile, quoted};
 use crate::scenes::Air;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
@@ -62,10 +62,9 @@ fn of_scene(
     let drawn = draw_frames(conditions, frames, SECONDS, told)?;
     let [whole, without @ ..] = &drawn[..] else { return Ok(()) };
     let reference = measured.keep_reference(&format!("{} with all", scene.name), whole.picture.clone());
-    let names = std::iter::once("with all effects".to_owned())
-        .chain(effects.iter().map(|effect| format!("without {}", effect.effect)));
-    for (name, frame) in names.zip(&drawn) {
-        let point = point(conditions, scene, name, whole, frame);
+    let left_out = std::iter::once(None).chain(effects.iter().map(|effect| Some(effect.effect)));
+    for (without, frame) in left_out.zip(&drawn) {
+        let point = point(conditions, scene, without, whole, frame);
         measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
     }
     let points = &measured.study.points[measured.study.points.len() - without.len()..];
@@ -78,7 +77,7 @@ fn of_scene(
 fn point(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
-    label: String,
+    without: Option<&str>,
     whole: &DrawnFrame,
     frame: &DrawnFrame,
 ) -> Point {
@@ -93,13 +92,14 @@ fn point(
     });
     Point {
         series: scene.name.clone(),
-        label,
+        label: without.map_or_else(|| "with all effects".to_owned(), |effect| format!("without {effect}")),
         milliseconds: frame.spread(),
         counts: frame.counts(),
         figures: figures.into_iter().flatten().collect(),
         command: format!(
-            "lumbre explain {} --measure --size {}",
+            "lumbre render {} -o frame.exr{} --size {} --frames 20 --timings times.json",
             scene.in_commands(),
+            without.map_or_else(String::new, |effect| format!(" --without {}", quoted(effect))),
             conditions.size_text()
         ),
         ..Point::default()

@@ -11,7 +11,7 @@ use lumbre_scene::{
 };
 
 use super::over_scenes;
-use crate::baked::{Baked, bake_arguments, bake_options, bake_scene};
+use crate::baked::{Baked, bake_arguments, bake_options, bake_scene, nothing_to_bake};
 use crate::findings::{listed, percent, rounded, short};
 use crate::frame::Frame;
 use crate::frames::draw_frames;
@@ -95,6 +95,7 @@ fn study() -> Study {
             across: Quantity::Count(BYTES.into()),
             up: Quantity::Error,
             joined: true,
+            front: true,
             ..Plot::default()
         }],
         ..Study::default()
@@ -114,6 +115,10 @@ fn of_scene(
     [before, after]: [f64; 2],
     measured: &mut Measured,
 ) -> Result<(), CostError> {
+    if let Some(why) = nothing_to_bake(conditions, scene)? {
+        measured.study.notes.push(why);
+        return Ok(());
+    }
     let part = |share: f64| before + share * (after - before);
     let options = bake_options(conditions, scene, conditions.unless_quick(TEXELS, FEW_TEXELS))?;
     let Density::TexelsPerMeter(densest) = options.density else { return Ok(()) };
@@ -201,7 +206,7 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Fo
             bake_arguments(&maps.options),
             conditions.size_text()
         ),
-        Format::Packed(_) => "lumbre cost -o again --study lightmaps".to_owned(),
+        Format::Packed(_) => conditions.again("lightmaps"),
     };
     Point {
         series,

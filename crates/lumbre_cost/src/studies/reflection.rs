@@ -151,7 +151,7 @@ fn findings(study: &Study, drawn: &[DrawnFrame]) -> Vec<String> {
         // Over all exponents: pairs of the same rounds.
         let pairs = drawn.chunks(models.len()).flat_map(|all| all[place].times.iter().zip(&all[0].times));
         let ratios: Vec<f64> = pairs.map(|(time, of_phong)| time / of_phong.max(1e-9)).collect();
-        if let Some(ratio) = Spread::of(&ratios) {
+        if let Some(ratio) = Spread::of_median(&ratios) {
             let range = format!("{} to {}", rounded(ratio.lower), rounded(ratio.upper));
             costs.push(match is_above_one(&ratio) {
                 Some(_) => {

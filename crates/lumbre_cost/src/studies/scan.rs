@@ -58,6 +58,7 @@ fn study() -> Study {
                 across: Quantity::Count("triangles".into()),
                 up: Quantity::Error,
                 joined: true,
+                front: true,
                 ..Plot::default()
             },
         ],

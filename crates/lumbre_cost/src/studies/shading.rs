@@ -114,6 +114,7 @@ fn study(whole: bool) -> Study {
             across: Quantity::Count("triangles".into()),
             up: Quantity::Error,
             joined: true,
+            front: true,
             ..Plot::default()
         });
     }

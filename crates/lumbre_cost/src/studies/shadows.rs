@@ -7,7 +7,7 @@ use lumbre_scene::{FrameSettings, SceneSettings, ShadowFilter};
 use lumbre_trace::TraceOptions;
 
 use super::over_scenes_made;
-use crate::findings::{cheapest_by_error, is_above_one, percent, ratio_of, rounded, short};
+use crate::findings::{cheapest_by_error, factor, percent, ratio_of, short};
 use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames};
 use crate::lamps_in_pieces::take_to_pieces;
@@ -60,6 +60,7 @@ fn study() -> Study {
                 up: Quantity::Error,
                 series: ShadowFilter::ALL.iter().map(|filter| filter.name().to_owned()).collect(),
                 joined: true,
+                front: true,
                 ..Plot::default()
             },
         ],
@@ -192,7 +193,7 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, asked: &Asked, frame: &
         milliseconds: frame.spread(),
         counts: frame.counts(),
         command: match asked.moving {
-            true => "lumbre cost -o again --study shadows".to_owned(),
+            true => conditions.again("shadows"),
             false => format!(
                 "lumbre render {} -o frame.exr {arguments} --size {} --frames 20 --timings times.json",
                 scene.in_commands(),
@@ -225,16 +226,10 @@ fn findings(scene: &str, all: &[Asked], points: &[Point], drawn: &[DrawnFrame]) 
         for filter in [ShadowFilter::PercentageCloser, ShadowFilter::Hard] {
             let Some(other) = usual(filter, 1.0, false) else { continue };
             let Some(ratio) = ratio_of(&drawn[other].times, &drawn[soft].times) else { continue };
-            let decided = match is_above_one(&ratio) {
-                Some(_) => "",
-                None => ", which is not told apart from 1",
-            };
             findings.push(format!(
-                "Read as {} a frame takes {} of the time of soft shadows ({} to {}){decided}, and is off by {}.",
+                "Read as {} a frame takes {} of the time of soft shadows, and is off by {}.",
                 filter.name(),
-                rounded(ratio.median),
-                rounded(ratio.lower),
-                rounded(ratio.upper),
+                factor(&ratio),
                 percent(error(other))
             ));
         }
@@ -249,13 +244,7 @@ fn findings(scene: &str, all: &[Asked], points: &[Point], drawn: &[DrawnFrame]) 
             let resolution = asked.settings.shadow_resolution;
             let kept = usual(ShadowFilter::Soft, resolution, false)?;
             let ratio = ratio_of(&drawn[place].times, &drawn[kept].times)?;
-            Some(format!(
-                "{} ({} to {}) at resolution {}",
-                rounded(ratio.median),
-                rounded(ratio.lower),
-                rounded(ratio.upper),
-                short(f64::from(resolution))
-            ))
+            Some(format!("{} at resolution {}", factor(&ratio), short(f64::from(resolution))))
         })
         .collect();
     if !told.is_empty() {

@@ -26,7 +26,7 @@ const SECONDS: f64 = 6.0;
 /// A frame as it is, with more, or with less.
 struct Change {
     name: &'static str,
-    /// On the command line, where there is such an option.
+    /// How it is asked for on the command line.
     arguments: &'static str,
     apply: fn(&mut World, &mut FrameOptions),
 }
@@ -42,7 +42,7 @@ const CHANGES: &[Change] = &[
         arguments: " --shading phong",
         apply: |_, options| options.shading = Some(Shading::Phong),
     },
-    Change { name: "a shadow of every lamp", arguments: "", apply: |world, _| every_lamp_casts(world) },
+    Change { name: "a shadow of every lamp", arguments: " --every-shadow", apply: |world, _| every_lamp_casts(world) },
     Change {
         name: "mirrors four deep",
         arguments: " --mirror-depth 4",
@@ -50,7 +50,7 @@ const CHANGES: &[Change] = &[
     },
     Change {
         name: EVERYTHING,
-        arguments: "",
+        arguments: " --every-shadow --shading phong --mirror-depth 4",
         apply: |world, options| {
             every_lamp_casts(world);
             (options.shading, options.mirror_depth) = (Some(Shading::Phong), 4);
@@ -89,6 +89,7 @@ fn study() -> Study {
             title: "Error against time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
+            front: true,
             ..Plot::default()
         }],
         ..Study::default()
