@@ -7,7 +7,8 @@ use bevy_ecs::prelude::*;
 use lumbre::optics::{Light, LightKind};
 use lumbre::render::{Display, FrameOptions, Gpu, meter, removable_effects};
 use lumbre::scene::{
-    self, ActiveCamera, Camera, Census, GlobalTransform, LoadOptions, LoadReport, Name, SceneSettings, SourceFile,
+    self, ActiveCamera, Camera, Census, GlobalTransform, LoadOptions, LoadReport, Name, SceneSettings,
+    SourceFile,
 };
 
 use crate::arguments::{Exposure, Frame, Reading};

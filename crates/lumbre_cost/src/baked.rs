@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, has_light_to_bake};
+use lumbre_bake::{
+    Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, has_light_to_bake,
+};
 use lumbre_scene::{GlobalTransform, Lightmap, Mesh, StaticObject, hidden_entities};
 
 use crate::converged::Maps;
@@ -59,9 +61,9 @@ pub fn nothing_to_bake(conditions: &Conditions<'_>, scene: &SceneFile) -> Result
     Ok(match (static_area(&mut world) > 0.0, has_light_to_bake(&mut world)) {
         (true, true) => None,
         (false, _) => Some(format!("Nothing of {name} is static, so that there is nothing to bake.")),
-        (_, false) => {
-            Some(format!("{name} has no light that is baked, no emission and no sky: its lightmaps would be black."))
-        }
+        (_, false) => Some(format!(
+            "{name} has no light that is baked, no emission and no sky: its lightmaps would be black."
+        )),
     })
 }
 

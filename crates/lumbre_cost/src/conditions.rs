@@ -71,7 +71,9 @@ impl Conditions<'_> {
     pub fn rounds(&self, seconds: f64) -> Rounds {
         match self.quick {
             _ if self.counts_only => Rounds { warm_up: 0, fewest: 0, most: 0, time: Duration::ZERO },
-            true => Rounds { warm_up: 1, fewest: 5, most: 15, time: Duration::from_secs_f64(seconds / QUICK) },
+            true => {
+                Rounds { warm_up: 1, fewest: 5, most: 15, time: Duration::from_secs_f64(seconds / QUICK) }
+            }
             false => Rounds { warm_up: 1, fewest: 5, most: 51, time: Duration::from_secs_f64(seconds) },
         }
     }

@@ -33,7 +33,11 @@ pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
             format!("{range} the cheapest is {} ({}: {}).", only.series, finest.label, cost_of(finest))
         }
         several => {
-            let what = if found[..fine].iter().any(|stretch| stretch.by_error) { "times and errors" } else { "times" };
+            let what = if found[..fine].iter().any(|stretch| stretch.by_error) {
+                "times and errors"
+            } else {
+                "times"
+            };
             format!("{range} the {what} do not decide between {}.", names_of(several))
         }
     });

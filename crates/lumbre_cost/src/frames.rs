@@ -80,7 +80,8 @@ pub fn draw_frames(
     let part = |share: f64| before + share * (after - before);
     let rounds = conditions.rounds(seconds);
     let timed = |frame| timed_work(conditions, frame, &renderers, &timed_target);
-    let mut work: Vec<Work<'_>> = frames.iter().zip(0..).map(|(frame, number)| timed((frame, number))).collect();
+    let mut work: Vec<Work<'_>> =
+        frames.iter().zip(0..).map(|(frame, number)| timed((frame, number))).collect();
     let mut drawn = while_compiling_ahead(conditions, &frames, |begun| {
         let mut drawn = Vec::new();
         for (number, frame) in frames.iter().enumerate() {
@@ -88,8 +89,12 @@ pub fn draw_frames(
             begun.begin(number, Drawing::Picture);
             let mut world = frame.world();
             let mut found = match conditions.as_shown {
-                true => picture_of(conditions, &mut conditions.pictures.borrow_mut(), &mut world, &frame.options)?,
-                false => picture_of(conditions, &mut renderers[number].borrow_mut(), &mut world, &frame.options)?,
+                true => {
+                    picture_of(conditions, &mut conditions.pictures.borrow_mut(), &mut world, &frame.options)?
+                }
+                false => {
+                    picture_of(conditions, &mut renderers[number].borrow_mut(), &mut world, &frame.options)?
+                }
             };
             if frame.counts_lights && !conditions.counts_only {
                 // With a renderer of its own: what it compiles for this is for nothing else.
@@ -157,7 +162,9 @@ fn while_compiling_ahead<T>(
 fn renderers(conditions: &Conditions<'_>, frames: &[Frame]) -> Vec<Rc<RefCell<Renderer>>> {
     let mut shared: BTreeMap<&'static str, Rc<RefCell<Renderer>>> = BTreeMap::new();
     let new = || Rc::new(RefCell::new(Renderer::new(conditions.gpu)));
-    let of = |frame: &Frame| frame.renderer.map_or_else(new, |name| Rc::clone(shared.entry(name).or_insert_with(new)));
+    let of = |frame: &Frame| {
+        frame.renderer.map_or_else(new, |name| Rc::clone(shared.entry(name).or_insert_with(new)))
+    };
     frames.iter().map(of).collect()
 }
 
@@ -254,7 +261,8 @@ fn lights_of(
     let options = FrameOptions { measure: Measure::Lights, ..picture_options(options) };
     renderer.render(world, &target.target(), &options)?;
     renderer.wait()?;
-    let counts = renderer.accounting().into_iter().flat_map(|account| &account.passes).filter_map(|pass| pass.lights);
+    let counts =
+        renderer.accounting().into_iter().flat_map(|account| &account.passes).filter_map(|pass| pass.lights);
     Ok(counts.fold(None, |sum, found| {
         let [tested, contributing] = sum.unwrap_or([0, 0]);
         Some([tested + found.tested, contributing + found.contributing])

@@ -13,8 +13,10 @@ pub fn front_of<'a>(
     points: impl IntoIterator<Item = &'a Point>,
     numbers: impl Fn(&Point) -> Option<(f64, f64)>,
 ) -> Vec<&'a Point> {
-    let mut known: Vec<(&Point, f64, f64)> =
-        points.into_iter().filter_map(|point| numbers(point).map(|(first, second)| (point, first, second))).collect();
+    let mut known: Vec<(&Point, f64, f64)> = points
+        .into_iter()
+        .filter_map(|point| numbers(point).map(|(first, second)| (point, first, second)))
+        .collect();
     // From the cheapest on, each has to be better than all before it.
     known.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
     let mut least = f64::INFINITY;

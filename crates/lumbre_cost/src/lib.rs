@@ -58,7 +58,7 @@ mod table;
 mod traced;
 mod tune;
 
-pub use comparison::{Change, What, compare_reports};
+pub use comparison::{Change, Figure, What, compare_reports};
 pub use conditions::{Conditions, Listener};
 pub use error::CostError;
 pub use findings::cheapest_by_error;

@@ -140,7 +140,8 @@ mod tests {
         assert_eq!(order, [0, 1, 2, 2, 1, 0]);
         assert_eq!(done[0].times, [1.0, 6.0]);
         assert_eq!(done.iter().map(|one| one.made).collect::<Vec<_>>(), [(0, 6), (1, 5), (2, 4)]);
-        let failed = repeated(2, 1, |piece, _| if piece == 1 { Err(CostError::Interrupted) } else { Ok((0.0, ())) });
+        let failed =
+            repeated(2, 1, |piece, _| if piece == 1 { Err(CostError::Interrupted) } else { Ok((0.0, ())) });
         assert!(matches!(failed, Err(CostError::Interrupted)));
     }
 

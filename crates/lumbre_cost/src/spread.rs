@@ -114,7 +114,9 @@ mod tests {
     /// Ranks from tables of the binomial distribution (as in Conover, "Practical Nonparametric Statistics", 1999, table A3).
     #[test]
     fn intervals_of_the_median_have_the_ranks_of_the_tables() {
-        for (count, outside) in [(1, 0), (2, 0), (5, 0), (6, 0), (8, 0), (9, 1), (12, 2), (15, 3), (20, 5), (51, 18)] {
+        for (count, outside) in
+            [(1, 0), (2, 0), (5, 0), (6, 0), (8, 0), (9, 1), (12, 2), (15, 3), (20, 5), (51, 18)]
+        {
             assert_eq!(ranks_outside(count), outside, "of {count}");
         }
         let values: Vec<f64> = (1..=15).map(f64::from).collect();

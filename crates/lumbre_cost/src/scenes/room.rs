@@ -46,7 +46,8 @@ const APART: f64 = 2.0 * SIZE.x;
 /// The room without haze, and another one like it beside it, whose light is its own: what moves in one changes nothing in the other.
 pub fn two_rooms() -> World {
     let mut world = room(Air::Clear);
-    let placed = world.query_filtered::<Entity, (With<Transform>, Without<Camera>)>().iter(&world).collect::<Vec<_>>();
+    let placed =
+        world.query_filtered::<Entity, (With<Transform>, Without<Camera>)>().iter(&world).collect::<Vec<_>>();
     for entity in placed {
         let copy = world.entity_mut(entity).clone_and_spawn();
         let mut copy = world.entity_mut(copy);

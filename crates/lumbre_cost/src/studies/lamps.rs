@@ -160,7 +160,9 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
             factor(&all),
             factor(&by_object)
         ));
-        if let (Some([all, _]), Some([few, contributing])) = (everything.light_evaluations, clusters.light_evaluations) {
+        if let (Some([all, _]), Some([few, contributing])) =
+            (everything.light_evaluations, clusters.light_evaluations)
+        {
             findings.push(format!(
                 "Asked everywhere, these lamps are evaluated {} times in a frame, by clusters {} times; {} of the latter evaluations bring more than 1/255.",
                 counted(all as f64),
@@ -227,7 +229,8 @@ fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<
     let before = measured.study.points.len();
     for (threshold, frame) in thresholds.iter().zip(ending) {
         let share = 100.0 * f64::from(*threshold);
-        let mut ended = Point { label: format!("at {} %", short(share)), ..point(conditions, frame, ENDING, lamps) };
+        let mut ended =
+            Point { label: format!("at {} %", short(share)), ..point(conditions, frame, ENDING, lamps) };
         ended.parameters.insert(THRESHOLD.into(), share);
         measured.add_picture(ended, frame.picture.clone(), &reference, ErrorOver::Picture)?;
     }

@@ -161,7 +161,8 @@ fn of_scene(
         let traced = traced(conditions, scene, &all[place].1)?;
         Ok((milliseconds_since(begun), traced))
     })?;
-    for ((name, options, samples, asked), Repeated { times, made: (picture, report) }) in all.iter().zip(done) {
+    for ((name, options, samples, asked), Repeated { times, made: (picture, report) }) in all.iter().zip(done)
+    {
         let point = Point {
             series: series(name),
             label: match options.depth.filter(|_| *name == CUT) {
@@ -238,10 +239,9 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
             ),
             None => "no number of paths that was tried gets there".to_owned(),
         };
-        let bake = frame
-            .figures
-            .get(BAKE)
-            .map_or(String::new(), |ms| format!(", after a bake of {} s", crate::findings::rounded(ms / 1e3)));
+        let bake = frame.figures.get(BAKE).map_or(String::new(), |ms| {
+            format!(", after a bake of {} s", crate::findings::rounded(ms / 1e3))
+        });
         findings.push(format!(
             "The best frame (\"{}\") is off by {} in {}{bake}; {paths}. The reference leaves {} open.",
             frame.label,

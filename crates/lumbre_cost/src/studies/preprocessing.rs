@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, Samples};
+use lumbre_bake::BakeOptions;
 use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
 use lumbre_scene::{
@@ -15,9 +15,7 @@ use lumbre_scene::{
 
 use super::bake::REFERENCE_SECONDS;
 use super::over_scenes;
-use crate::baked::{
-    Baked, bake_arguments, bake_options, bake_world, maps_of, nothing_to_bake, texel_error,
-};
+use crate::baked::{Baked, bake_arguments, bake_options, bake_world, maps_of, nothing_to_bake, texel_error};
 use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{error_of, factor, milliseconds, ratio_of, rounded, times_of};
 use crate::frame::Frame;
@@ -275,7 +273,8 @@ fn findings_of_frames(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Ve
         && let Some(ratio) = ratio_of(&lit.times, &alone.times)
         && let (Some(time), Some(bake)) = (&lightmaps.milliseconds, lightmaps.figures.get(BEFORE))
     {
-        let [before, after] = [alone, lit].map(|frame| rounded(f64::from(frame.statistics.lights_per_object)));
+        let [before, after] =
+            [alone, lit].map(|frame| rounded(f64::from(frame.statistics.lights_per_object)));
         findings.push(format!(
             "With lightmaps a frame takes {} of its time without them, and an object in view has {after} lights in its list in place of {before}, on average; the lightmaps take {} s once, as long as {} such frames ({}).",
             factor(&ratio),

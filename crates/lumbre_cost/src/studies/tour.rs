@@ -42,7 +42,11 @@ const CHANGES: &[Change] = &[
         arguments: " --shading phong",
         apply: |_, options| options.shading = Some(Shading::Phong),
     },
-    Change { name: "a shadow of every lamp", arguments: " --every-shadow", apply: |world, _| every_lamp_casts(world) },
+    Change {
+        name: "a shadow of every lamp",
+        arguments: " --every-shadow",
+        apply: |world, _| every_lamp_casts(world),
+    },
     Change {
         name: "mirrors four deep",
         arguments: " --mirror-depth 4",
