@@ -7,9 +7,10 @@ use std::time::Duration;
 
 use lumbre_render::{Gpu, Renderer};
 
+use crate::command_line::quoted;
 use crate::converged::ConvergedBakes;
 use crate::rounds::Rounds;
-use crate::scene_file::quoted;
+
 use crate::{CostError, Spread};
 
 /// By which factor the frames of a quick report have less time than those of a full one.

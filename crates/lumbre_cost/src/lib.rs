@@ -28,6 +28,7 @@
 
 mod baked;
 mod clustered_mesh;
+mod command_line;
 mod comparison;
 mod compile_ahead;
 mod conditions;
@@ -58,6 +59,7 @@ mod table;
 mod traced;
 mod tune;
 
+pub use command_line::command_words;
 pub use comparison::{Change, Figure, What, compare_reports};
 pub use conditions::{Conditions, Listener};
 pub use error::CostError;

@@ -4,11 +4,12 @@ use lumbre_render::{FrameOptions, removable_effects};
 use lumbre_scene::Census;
 
 use super::over_scenes;
+use crate::command_line::quoted;
 use crate::findings::{is_above_one, listed, listed_with, percent, ratio_of, rounded};
 use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
-use crate::scene_file::{SceneFile, quoted};
+use crate::scene_file::SceneFile;
 use crate::scenes::Air;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 

@@ -8,6 +8,7 @@ use lumbre_scene::{Camera, Name};
 use lumbre_trace::TraceOptions;
 
 use super::over_scenes_made;
+use crate::command_line::quoted;
 use crate::findings::{milliseconds, percent};
 use crate::frame::Frame;
 use crate::frames::draw_frames;
@@ -183,8 +184,9 @@ fn of_camera(
             milliseconds: frame.spread(),
             counts: frame.counts(),
             command: format!(
-                "lumbre render {} -o frame.exr --camera \"{stop}\"{} --size {} --frames 20 --timings times.json",
+                "lumbre render {} -o frame.exr --camera {}{} --size {} --frames 20 --timings times.json",
                 scene.in_commands(),
+                quoted(stop),
                 change.arguments,
                 conditions.size_text()
             ),
