@@ -36,7 +36,7 @@ fn a_small_report_and_what_changed_since() {
     let asked = ["cost", "-o", text(&report), "--quick", "--study", "reflection", "--size", "24x16"];
     let output = lumbre(&asked);
     assert!(output.status.success(), "{}", stderr(&output));
-    assert!(stdout(&output).contains("Reflection models beside Phong's (10 points"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("Reflection models beside Phong's (12 points"), "{}", stdout(&output));
     assert!(stdout(&output).trim_end().ends_with("index.html"), "{}", stdout(&output));
     assert!(stderr(&output).contains("lumbre: reflection: "), "{}", stderr(&output));
     let found = read_report(&report).unwrap();

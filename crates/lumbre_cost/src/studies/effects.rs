@@ -1,20 +1,23 @@
 //! Every effect of a scene switched off in turn: what a frame saves without it, and what its picture loses.
 
+use lumbre_bake::{BakeOptions, Probes};
 use lumbre_render::{FrameOptions, removable_effects};
 use lumbre_scene::Census;
 
-use super::over_scenes;
+use crate::baked::{bake_options, bake_scene};
 use crate::command_line::quoted;
-use crate::findings::{is_above_one, listed, listed_with, percent, ratio_of, rounded};
+use crate::findings::{is_above_one, listed, listed_with, percent, ratio_of, rounded, rounds};
 use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
-use crate::scenes::Air;
+use crate::scenes::{Air, every_effect, room};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Seconds for the frames of each scene of a full report.
 const SECONDS: f64 = 16.0;
+/// Of the lightmaps of the room.
+const TEXELS: f64 = 4_000.0;
 /// Effects that are told of, the costliest.
 const TOLD: usize = 3;
 const SAVED: &str = "saved, ms";
@@ -24,9 +27,29 @@ const SAVED: &str = "saved, ms";
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    over_scenes(conditions, study(), ("hazy-room", Air::Hazy), |scene, told, measured| {
-        of_scene(conditions, scene, told, measured)
-    })
+    let mut measured = Measured { study: study(), ..Measured::default() };
+    let scenes = match conditions.files.is_empty() {
+        true => vec![of_its_own(conditions)?],
+        false => SceneFile::given(conditions)?,
+    };
+    let count = scenes.len() as f64;
+    for (place, scene) in scenes.iter().enumerate() {
+        of_scene(conditions, scene, [place, place + 1].map(|place| place as f64 / count), &mut measured)?;
+    }
+    Ok(measured)
+}
+
+/// A room with every effect that can be left out, baked for its lightmaps and volumes; a quick report has half of them.
+fn of_its_own(conditions: &Conditions<'_>) -> Result<SceneFile, CostError> {
+    if conditions.quick {
+        return SceneFile::made(conditions, "hazy-room", room(Air::Hazy));
+    }
+    let name = "every-effect";
+    let scene = SceneFile::made(conditions, name, every_effect())?;
+    let options =
+        BakeOptions { probes: Probes::Always, error: 0.05, ..bake_options(conditions, &scene, TEXELS)? };
+    let baked = bake_scene(conditions, &scene, &options, [0.0, 0.05])?;
+    SceneFile::made(conditions, &format!("{name}-baked"), baked.world)
 }
 
 fn study() -> Study {
@@ -54,11 +77,12 @@ fn of_scene(
 ) -> Result<(), CostError> {
     let mut whole = scene.open(conditions.aspect())?;
     let effects = removable_effects(&Census::of(&mut whole), &FrameOptions::default());
-    let mut frames = vec![Frame::new(whole, FrameOptions::default()).sharing("effects")];
+    let counting = |frame: Frame| frame.sharing("effects").counting_lights(!conditions.quick);
+    let mut frames = vec![counting(Frame::new(whole, FrameOptions::default()))];
     for effect in &effects {
         let (mut world, mut options) = (scene.open(conditions.aspect())?, FrameOptions::default());
         effect.remove(&mut world, &mut options);
-        frames.push(Frame::new(world, options).sharing("effects"));
+        frames.push(counting(Frame::new(world, options)));
     }
     let drawn = draw_frames(conditions, frames, SECONDS, told)?;
     let [whole, without @ ..] = &drawn[..] else { return Ok(()) };
@@ -148,16 +172,23 @@ fn findings(
             told.join("; ")
         ));
     }
-    let open: Vec<&str> = known
+    let open: Vec<&(&str, Spread, f64)> =
+        known.iter().filter(|(_, ratio, _)| is_above_one(ratio).is_none()).collect();
+    let names: Vec<&str> = open.iter().map(|(effect, ..)| *effect).collect();
+    if let Some(fewest) = open.iter().map(|(_, ratio, _)| ratio.rounds).min() {
+        findings.push(format!(
+            "Whether {} anything in the {scene} is not distinguishable in {}.",
+            listed_with(&names, "costs", "cost", "or"),
+            rounds(fewest)
+        ));
+    }
+    let spared: Vec<&str> = known
         .iter()
-        .filter(|(_, ratio, _)| is_above_one(ratio).is_none())
+        .filter(|(_, ratio, _)| is_above_one(ratio) == Some(false))
         .map(|(effect, ..)| *effect)
         .collect();
-    if !open.is_empty() {
-        findings.push(format!(
-            "In the {scene} the times do not tell whether {} anything.",
-            listed_with(&open, "costs", "cost", "or")
-        ));
+    if !spared.is_empty() {
+        findings.push(format!("The frame of the {scene} takes longer without {}.", listed(&spared, "or")));
     }
     // What costs the most per loss: the first to go.
     let worth = |(_, ratio, error): &&&(&str, Spread, f64)| (ratio.median - 1.0) / error.max(1e-9);

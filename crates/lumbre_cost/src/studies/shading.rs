@@ -1,7 +1,7 @@
 //! Flat, Gouraud and Phong shading over meshes from coarse to fine, against the exact surface: which of them reaches which error in the least
 //! time.
 
-use lumbre_optics::{ReflectionModel, Shading};
+use lumbre_optics::{Lobe, ReflectionModel, Shading};
 use lumbre_render::FrameOptions;
 
 use crate::findings::{cheapest_by_error, is_above_one, percent, ratio_of, rounded};
@@ -69,7 +69,7 @@ fn spheres(conditions: &Conditions<'_>) -> Result<Vec<Subject>, CostError> {
 }
 
 fn shiny(depth: u32) -> Ball {
-    Ball { depth, shininess: 40.0, reflection: ReflectionModel::Phong }
+    Ball { depth, shininess: 40.0, reflection: ReflectionModel::Phong, lobe: Lobe::Bare }
 }
 
 fn given(conditions: &Conditions<'_>) -> Result<Vec<Subject>, CostError> {
