@@ -4,13 +4,14 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use lumbre_bake::{
     Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, has_light_to_bake,
 };
-use lumbre_scene::{GlobalTransform, Lightmap, Mesh, StaticObject, hidden_entities};
+use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, Mesh, StaticObject, hidden_entities};
 
 use crate::converged::Maps;
+use crate::picture::Picture;
 use crate::scene_file::SceneFile;
 use crate::{Conditions, CostError, ErrorOf};
 
@@ -137,6 +138,22 @@ pub fn maps_of(world: &mut World) -> Maps {
     named.collect()
 }
 
+/// Columns in which texels are kept.
+const COLUMNS: usize = 256;
+
+/// The texels of all maps one after the other, in their names' order; not a number where one shows no surface.
+pub fn picture_of_maps(maps: &Maps) -> Picture {
+    let of_map = |(image, errors): &(Arc<LightmapImage>, Arc<[f32]>)| {
+        let texels = image.texels.iter().zip(errors.iter());
+        texels
+            .map(|(texel, error)| if error.is_finite() { texel.as_dvec3() } else { DVec3::NAN })
+            .collect::<Vec<_>>()
+    };
+    let mut radiance: Vec<DVec3> = maps.values().flat_map(of_map).collect();
+    radiance.resize(radiance.len().next_multiple_of(COLUMNS), DVec3::NAN);
+    Picture { width: COLUMNS, radiance }
+}
+
 /// By which part the noise that a bake states of itself may be off.
 const NOISE_KNOWN_TO: f64 = 0.2;
 
@@ -179,7 +196,7 @@ pub fn texel_error(found: &Maps, reference: &Maps) -> Option<ErrorOf> {
 
 #[cfg(test)]
 mod tests {
-    use lumbre_scene::{LightmapEncoding, LightmapImage};
+    use lumbre_scene::LightmapEncoding;
 
     use super::*;
 

@@ -70,7 +70,7 @@ pub use live::{Beside, BesideReference, LightCost, LightCosts, Priced, SideView,
 pub use page::{Images, page};
 pub use picture::{Compared, Picture, compared};
 pub use report::{
-    CostReport, ErrorOf, ErrorOver, Machine, Plot, Point, PointPicture, Quantity, Settings, Study,
+    CostReport, ErrorOf, ErrorOver, KeptMaps, Machine, Plot, Point, PointPicture, Quantity, Settings, Study,
 };
 pub use run::{CostOptions, CostProgress, measure};
 pub use spread::Spread;

@@ -123,6 +123,18 @@ pub struct PointPicture {
     pub reference: String,
     /// What of it the point's error is.
     pub error_of: ErrorOver,
+    /// Where the error is of lightmaps: their texels, which have no picture to be shown.
+    #[serde(default)]
+    pub maps: Option<KeptMaps>,
+}
+
+/// Files of lightmaps, below the folder of the report, as `.exr`: the texels of all maps of a level one after the other, not a number where a texel shows no surface.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct KeptMaps {
+    /// Those of the point, without the extension.
+    pub picture: String,
+    /// Those that they are compared with.
+    pub reference: String,
 }
 
 /// What a point's relative RMSE and largest difference are of. FLIP is of the whole picture always.

@@ -54,13 +54,13 @@ pub fn every_effect() -> World {
     }
     world.entity_mut(gouraud).insert(Shading::Gouraud);
     world.entity_mut(clear).insert(Medium { fresnel: true, ..Medium::default() });
-    let bars = |x: u32, _: u32| [255, 255, 255, if x / 4 % 2 == 0 { 255 } else { 0 }];
+    let bars = |x: u32, _: u32| [255, 255, 255, if (x / 4).is_multiple_of(2) { 255 } else { 0 }];
     world
         .entity_mut(grating)
         .insert(MaterialTextures { base_color: Some(texture("bars", bars)), ..MaterialTextures::default() });
     // Ridges: normals that lean to either side in turn.
-    let ridges = |x: u32, _: u32| [if x / 4 % 2 == 0 { 88 } else { 168 }, 128, 240, 255];
-    let cavities = |x: u32, y: u32| [if (x / 4 + y / 4) % 2 == 0 { 255 } else { 120 }, 0, 0, 255];
+    let ridges = |x: u32, _: u32| [if (x / 4).is_multiple_of(2) { 88 } else { 168 }, 128, 240, 255];
+    let cavities = |x: u32, y: u32| [if (x / 4 + y / 4).is_multiple_of(2) { 255 } else { 120 }, 0, 0, 255];
     world.entity_mut(bumpy).insert(MaterialTextures {
         normal: Some(NormalTexture { texture: texture("ridges", ridges), scale: 1.0 }),
         occlusion: Some(OcclusionTexture { texture: texture("cavities", cavities), strength: 1.0 }),

@@ -7,7 +7,9 @@ use lumbre_bake::{BakeOptions, Quality};
 use lumbre_render::FrameOptions;
 
 use super::over_scenes;
-use crate::baked::{bake_arguments, bake_options, bake_scene, maps_of, nothing_to_bake, texel_error};
+use crate::baked::{
+    bake_arguments, bake_options, bake_scene, maps_of, nothing_to_bake, picture_of_maps, texel_error,
+};
 use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{cheapest_by_error, counted, error_of, percent, rounded, short, times_of};
 use crate::frames::draw_picture;
@@ -15,7 +17,7 @@ use crate::measured::Measured;
 use crate::rounds::{Repeated, repeated};
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;
-use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
+use crate::{Conditions, CostError, Plot, Point, Quantity, Spread, Study};
 
 /// Errors that are asked for, as shares.
 const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01];
@@ -125,6 +127,8 @@ fn of_scene(
         percent(truth.report.error_of_mean)
     ));
     let reference = measured.keep_reference(&format!("{} converged", scene.name), truth.picture.clone());
+    let reference_maps =
+        measured.keep_reference(&format!("{} converged maps", scene.name), picture_of_maps(&truth.maps));
 
     let all = asked(conditions, options);
     let done = repeated(all.len(), conditions.repetitions(), |place, [from, to]| {
@@ -134,7 +138,8 @@ fn of_scene(
     })?;
     let first = measured.study.points.len();
     for (asked, Repeated { times, made: mut baked }) in all.iter().zip(done) {
-        let error = texel_error(&maps_of(&mut baked.world), &truth.maps);
+        let maps = maps_of(&mut baked.world);
+        let error = texel_error(&maps, &truth.maps);
         let picture = draw_picture(conditions, &mut baked.world, &FrameOptions::default())?;
         let report = &baked.report;
         let mut figures: Vec<(&str, f64)> = vec![(STATED, 100.0 * report.error_of_mean)];
@@ -156,7 +161,7 @@ fn of_scene(
             command: command(conditions, scene, asked),
             picture: None,
         };
-        measured.add_picture(point, picture, &reference, ErrorOver::Beyond)?;
+        measured.add_maps(point, (picture, &reference), (picture_of_maps(&maps), &reference_maps))?;
     }
     let points: Vec<&Point> = measured.study.points[first..].iter().collect();
     let findings = findings(scene, &points);

@@ -104,8 +104,10 @@ fn by_number(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<Tim
     let mut found = Vec::new();
     for &lamps in numbers {
         let three: Vec<DrawnFrame> = drawn.by_ref().take(LISTS.len()).collect();
+        let reference = measured.keep_reference(&format!("{lamps} everywhere"), three[0].picture.clone());
         for ((_, series), frame) in LISTS.iter().zip(&three) {
-            measured.add_error(point(conditions, frame, series, lamps), &frame.picture, &three[0].picture)?;
+            let point = point(conditions, frame, series, lamps);
+            measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
         }
         found.push((lamps, three));
     }
@@ -276,10 +278,12 @@ fn of_files(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), 
     let drawn = draw_frames(conditions, frames, SECONDS, [0.0, 1.0])?;
     for (scene, three) in scenes.iter().zip(drawn.chunks(LISTS.len())) {
         let before = measured.study.points.len();
+        let reference =
+            measured.keep_reference(&format!("{} everywhere", scene.name), three[0].picture.clone());
         for ((_, series), frame) in LISTS.iter().zip(three) {
             let lamps = frame.statistics.lights;
             let own = Point { label: scene.name.clone(), ..point(conditions, frame, series, lamps) };
-            measured.add_error(own, &frame.picture, &three[0].picture)?;
+            measured.add_picture(own, frame.picture.clone(), &reference, ErrorOver::Picture)?;
         }
         let points: Vec<&Point> = measured.study.points[before..].iter().collect();
         let largest = points

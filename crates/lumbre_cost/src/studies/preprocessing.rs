@@ -15,7 +15,9 @@ use lumbre_scene::{
 
 use super::bake::REFERENCE_SECONDS;
 use super::over_scenes;
-use crate::baked::{Baked, bake_arguments, bake_options, bake_world, maps_of, nothing_to_bake, texel_error};
+use crate::baked::{
+    Baked, bake_arguments, bake_options, bake_world, maps_of, nothing_to_bake, picture_of_maps, texel_error,
+};
 use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{error_of, factor, milliseconds, ratio_of, rounded, times_of};
 use crate::frame::Frame;
@@ -132,7 +134,11 @@ fn after_a_change(
     let first = measured.study.points.len();
     let options_of_truth = converged(conditions, options, reference_time(conditions));
     let (mut truth, _) = bake_world(conditions, changed()?, &options_of_truth, None, [part(0.1), part(0.4)])?;
+    let drawn = draw_picture(conditions, &mut truth.world, &FrameOptions::default())?;
+    let reference = measured.keep_reference(&format!("{} changed, converged", scene.name), drawn);
     let truth = maps_of(&mut truth.world);
+    let reference_maps =
+        measured.keep_reference(&format!("{} changed, converged maps", scene.name), picture_of_maps(&truth));
     let formers = [None, Some(&samples)];
     let done = repeated(formers.len(), conditions.repetitions(), |place, [from, to]| {
         let told = [from, to].map(|share| part(0.4 + 0.6 * share));
@@ -145,8 +151,10 @@ fn after_a_change(
     }
     let labels = [format!("whole, {moved} moved"), format!("what {moved} changed")];
     for (Repeated { times, made: mut baked }, label) in done.into_iter().zip(labels) {
-        let error = texel_error(&maps_of(&mut baked.world), &truth);
-        measured.study.points.push(Point {
+        let maps = maps_of(&mut baked.world);
+        let error = texel_error(&maps, &truth);
+        let frame = draw_picture(conditions, &mut baked.world, &FrameOptions::default())?;
+        let point = Point {
             series: scene.series(conditions, BAKE),
             label,
             milliseconds: Spread::of(&times),
@@ -158,7 +166,8 @@ fn after_a_change(
             .into(),
             command: conditions.again("preprocessing"),
             ..Point::default()
-        });
+        };
+        measured.add_maps(point, (frame, &reference), (picture_of_maps(&maps), &reference_maps))?;
     }
     let finding = finding_of_change(&scene.name, &moved, &measured.study.points[first..]);
     measured.study.findings.extend(finding);
