@@ -201,7 +201,9 @@ fn what_shrinks_comes_or_goes_is_reported_and_fails_only_where_something_is_lost
     let named = |text: &str| format!("bake, final, a: {text}");
     let shrunk = changed(&|point| *point.counts.get_mut("rays").unwrap() = 500.0);
     assert_eq!(shrunk, (false, false, named("rays 500 instead of 1000 (0.500 times)")));
-    let new = changed(&|point| drop(point.counts.insert("texels".into(), 3.0)));
+    let new = changed(&|point| {
+        point.counts.insert("texels".into(), 3.0);
+    });
     assert_eq!(new, (false, false, named("texels is counted for the first time")));
     let better = changed(&|point| point.error.as_mut().unwrap().relative_rmse = 0.01);
     assert_eq!(better, (false, false, named("error 1.00 % instead of 2.00 % (0.500 times)")));

@@ -171,7 +171,9 @@ fn a_file_with_nothing_to_bake_is_said_to_have_nothing() {
         let objects: Vec<_> = world.query_filtered::<Entity, With<StaticObject>>().iter(&world).collect();
         world.query::<&mut Light>().iter_mut(&mut world).for_each(|mut light| light.bake = BakeMode::Dynamic);
         if !is_static {
-            objects.into_iter().for_each(|object| drop(world.entity_mut(object).remove::<StaticObject>()));
+            for object in objects {
+                world.entity_mut(object).remove::<StaticObject>();
+            }
         }
         world
     };
