@@ -126,6 +126,9 @@ pub struct FrameOptions {
     pub specular_antialiasing: Option<bool>,
     /// By which lists lights are found.
     pub light_lists: LightLists,
+    /// No tile of pixels that has a list of lights of its own has a shorter side than this, in pixels: what is finer costs more lists and saves lights. The renderer has tiles of 32 pixels and of powers
+    /// of two above that, up to 1024, and one of the whole frame; where lists would be too many it takes coarser ones by itself.
+    pub finest_cluster_tile: u32,
     /// Whether opaque surfaces are lit where they are drawn, or afterwards.
     pub rendering_path: RenderingPath,
     /// Uses the lightmaps. Without them static lights shade lightmapped meshes like any other.
@@ -167,6 +170,7 @@ impl Default for FrameOptions {
             flat_rule: None,
             specular_antialiasing: None,
             light_lists: LightLists::Auto,
+            finest_cluster_tile: 32,
             rendering_path: RenderingPath::Auto,
             lightmaps: true,
             irradiance_volumes: true,

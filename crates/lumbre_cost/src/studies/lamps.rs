@@ -26,7 +26,13 @@ const FEW_THRESHOLDS: &[f32] = &[0.1, 0.02, 0.005];
 /// With more lamps to draw a frame takes longer than to compile its shaders.
 const SHARING: u32 = 64;
 const LAMPS: &str = "lamps";
+const IN_CLUSTER: &str = "lamps in a cluster's list";
 const THRESHOLD: &str = "threshold, % of white";
+/// Pixels along the side of the smallest tiles that have lists.
+const TILES: &[u32] = &[32, 64, 128, 256];
+const FEW_TILES: &[u32] = &[32, 128];
+const TILE: &str = "pixels along a tile";
+const SIZED: &str = "clusters by size";
 const ENDING: &str = "lamps that end, by clusters";
 /// Seconds for the frames of each part of a full report.
 const SECONDS: f64 = 14.0;
@@ -45,6 +51,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
     }
     let times = by_number(conditions, &mut measured)?;
     measured.study.findings.extend(findings_by_number(&measured.study, &times));
+    by_tile(conditions, &mut measured)?;
     by_threshold(conditions, &mut measured)?;
     Ok(measured)
 }
@@ -62,6 +69,14 @@ fn study() -> Study {
                 across: Quantity::Parameter(LAMPS.into()),
                 up: Quantity::Milliseconds,
                 series: lists(),
+                joined: true,
+                ..Plot::default()
+            },
+            Plot {
+                title: "Time against the size of clusters".into(),
+                across: Quantity::Parameter(TILE.into()),
+                up: Quantity::Milliseconds,
+                series: vec![SIZED.into()],
                 joined: true,
                 ..Plot::default()
             },
@@ -100,11 +115,11 @@ fn by_number(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<Tim
             frames.push(if lamps <= SHARING { frame.sharing(name) } else { frame });
         }
     }
-    let mut drawn = draw_frames(conditions, frames, SECONDS, [0.0, 0.6])?.into_iter();
+    let mut drawn = draw_frames(conditions, frames, SECONDS, [0.0, 0.5])?.into_iter();
     let mut found = Vec::new();
     for &lamps in numbers {
         let three: Vec<DrawnFrame> = drawn.by_ref().take(LISTS.len()).collect();
-        let reference = measured.keep_reference(&format!("{lamps} everywhere"), three[0].picture.clone());
+        let reference = measured.keep_reference(&everywhere(lamps), three[0].picture.clone());
         for ((_, series), frame) in LISTS.iter().zip(&three) {
             let point = point(conditions, frame, series, lamps);
             measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
@@ -120,7 +135,7 @@ fn point(conditions: &Conditions<'_>, frame: &DrawnFrame, series: &str, lamps: u
     counts.insert("lamps in an object's list".into(), f64::from(frame.statistics.lights_per_object));
     if lists.clustered {
         let clusters: f64 = lists.clusters.iter().map(|count| f64::from(*count)).product();
-        counts.insert("lamps in a cluster's list".into(), lists.entries as f64 / clusters.max(1.0));
+        counts.insert(IN_CLUSTER.into(), lists.entries as f64 / clusters.max(1.0));
     }
     Point {
         series: series.to_owned(),
@@ -192,12 +207,61 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
 
 /// The lists that are the cheapest with so many lamps: one where the times decide, several where they do not, in the order of [`LISTS`].
 fn cheapest_with(study: &Study, lamps: u32) -> Vec<&str> {
-    let here = study.points.iter().filter(|point| point.parameters.get(LAMPS) == Some(&f64::from(lamps)));
+    let is_list = |series: &str| LISTS.iter().any(|(_, name)| *name == series);
+    let here = study.points.iter().filter(|point| is_list(&point.series));
+    let here = here.filter(|point| point.parameters.get(LAMPS) == Some(&f64::from(lamps)));
     let timed: Vec<(&str, Spread)> =
         here.filter_map(|point| Some((point.series.as_str(), point.milliseconds?))).collect();
     let first = timed.iter().min_by(|a, b| a.1.median.total_cmp(&b.1.median));
     let is_level = |time: &Spread| first.is_some_and(|(_, least)| !least.is_below(time));
     timed.iter().filter(|(_, time)| is_level(time)).map(|(series, _)| *series).collect()
+}
+
+/// The most lamps by clusters of several sizes: small ones have short lists, and many of them.
+fn by_tile(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), CostError> {
+    let lamps = conditions.unless_quick(MANY, FEW).last().copied().unwrap_or(1);
+    let tiles = conditions.unless_quick(TILES, FEW_TILES);
+    let asked = BallsAndLamps { lamps, threshold: USUAL, seed: conditions.seed };
+    let scene = SceneFile::made(conditions, &format!("lamps-{lamps}"), balls_and_lamps(asked))?;
+    let mut frames = Vec::new();
+    for &finest_cluster_tile in tiles {
+        let options = FrameOptions { finest_cluster_tile, ..found_by(LightLists::Clusters) };
+        let frame = Frame::new(scene.open(conditions.aspect())?, options);
+        frames.push(frame.sharing(SIZED).counting_lights(!conditions.quick));
+    }
+    let drawn = draw_frames(conditions, frames, 0.3 * SECONDS, [0.5, 0.65])?;
+    let reference = measured.file_name(&everywhere(lamps));
+    let first = measured.study.points.len();
+    for (&tile, frame) in tiles.iter().zip(&drawn) {
+        let mut sized = Point {
+            label: format!("{lamps} lamps, tiles of {tile} pixels"),
+            ..point(conditions, frame, SIZED, lamps)
+        };
+        sized.parameters.insert(TILE.into(), f64::from(tile));
+        measured.add_picture(sized, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+    }
+    let in_list = |point: &Point| point.counts.get(IN_CLUSTER).copied().map_or_else(String::new, counted);
+    let points = &measured.study.points[first..];
+    if let (Some(fine), Some(coarse)) = (points.first(), points.last())
+        && let (Some(finest), Some(coarsest)) = (drawn.first(), drawn.last())
+        && let Some(ratio) = ratio_of(&coarsest.times, &finest.times)
+    {
+        let finding = format!(
+            "With {lamps} lamps, tiles of {} pixels in place of {} lengthen a cluster's list from {} lamps to {}, and a frame takes {} of the time.",
+            tiles[tiles.len() - 1],
+            tiles[0],
+            in_list(fine),
+            in_list(coarse),
+            factor(&ratio)
+        );
+        measured.study.findings.push(finding);
+    }
+    Ok(())
+}
+
+/// What the frame of so many lamps that are asked everywhere is called.
+fn everywhere(lamps: u32) -> String {
+    format!("{lamps} everywhere")
 }
 
 fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), CostError> {
@@ -220,7 +284,7 @@ fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<
             frame
         });
     }
-    let drawn = draw_frames(conditions, frames, SECONDS, [0.6, 1.0])?;
+    let drawn = draw_frames(conditions, frames, SECONDS, [0.65, 1.0])?;
     let [endless, ending @ ..] = &drawn[..] else { return Ok(()) };
     let reference = measured.keep_reference(&format!("{lamps} endless lamps"), endless.picture.clone());
     let whole = Point {

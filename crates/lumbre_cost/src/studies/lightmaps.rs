@@ -90,6 +90,10 @@ fn study() -> Study {
         title: "Density and format of lightmaps".into(),
         question: "How many texels along a metre, and how many bytes for each: what does a frame lose, and what does it cost?".into(),
         reference: "the frame with the densest maps, in half floats".into(),
+        notes: vec![
+            "Frames unpack lightmaps when they are uploaded: on the device every format is half floats, so that the times of formats are those of one texture. Bytes are what each format takes itself."
+                .into(),
+        ],
         plots: vec![Plot {
             title: "Error against bytes".into(),
             across: Quantity::Count(BYTES.into()),
