@@ -13,11 +13,10 @@ use std::time::{Duration, Instant};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use lumbre_bake::{Bake, BakeOptions, BakeReport, CancelToken, Density, Quality, has_light_to_bake};
-use lumbre_optics::{BakeMode, Light, LightKind, Material};
 use lumbre_scene::{
-    DynamicObject, GlobalTransform, IrradianceVolume, Lightmap, LoadError, LoadOptions, MaterialTextures,
-    Mesh, Name, PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject,
-    Transform, hidden_entities, save_baked,
+    GlobalTransform, IrradianceVolume, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh, Name,
+    PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject, Transform,
+    save_baked,
 };
 
 /// One bake of several, each better than the one before.

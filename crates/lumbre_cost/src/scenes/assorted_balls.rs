@@ -8,13 +8,13 @@ use lumbre_mesh::shapes::{plane, tetrahedral_sphere};
 use lumbre_optics::{Light, Material, Surface};
 use lumbre_scene::{Camera, Mesh, Name, Projection, SceneSettings, Transform};
 
-/// Subdivisions of the balls of a row, from left to right: 64 to 16,384 triangles.
-const DEPTHS: std::ops::RangeInclusive<u32> = 2..=6;
+/// Subdivisions of the balls of a row, from left to right: 256 to 4,096 triangles.
+const DEPTHS: std::ops::RangeInclusive<u32> = 3..=5;
 /// Rows by what they are called, the height and depth of their middle in metres, and the distance from ball to ball.
-const ROWS: [(&str, f64, f64, f64); 2] = [("near", 0.5, 0.0, 1.0), ("far", 3.4, -12.0, 1.6)];
+const ROWS: [(&str, f64, f64, f64); 2] = [("near", 0.5, 0.0, 1.1), ("far", 3.6, -9.0, 1.5)];
 const RADIUS: f32 = 0.45;
 
-/// The balls, under a sun and a lamp.
+/// The balls, under a sun and a weaker light from the other side.
 pub fn assorted_balls() -> World {
     let mut world = World::new();
     world.insert_resource(SceneSettings { ambient: Vec3::splat(0.08), ..SceneSettings::default() });
@@ -37,9 +37,9 @@ pub fn assorted_balls() -> World {
     }
     let sun = Transform::from_xyz(2.0, 3.0, 2.5).looking_at(DVec3::ZERO, DVec3::Y);
     world.spawn((Name::new("sun"), Light::directional(Vec3::splat(0.6)), sun));
-    let lamp = Light::point(Vec3::new(4.0, 3.0, 2.0)).with_range(9.0);
-    world.spawn((Name::new("lamp"), lamp, Transform::from_xyz(-3.0, 3.0, 3.0)));
-    let eye = Transform::from_xyz(0.0, 1.6, 4.6).looking_at(DVec3::new(0.0, 1.25, 0.0), DVec3::Y);
+    let fill = Transform::from_xyz(-3.0, 1.0, 2.0).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Name::new("fill light"), Light::directional(Vec3::new(0.12, 0.14, 0.18)), fill));
+    let eye = Transform::from_xyz(0.0, 1.7, 3.6).looking_at(DVec3::new(0.0, 1.3, 0.0), DVec3::Y);
     let projection = Projection::perspective(0.75);
     world.spawn((Name::new("camera"), Camera { projection, exposure: 1.0 }, eye));
     world

@@ -21,9 +21,9 @@ use crate::{Conditions, CostError, Plot, Point, Quantity, Spread, Study};
 
 /// Errors that are asked for, as shares.
 const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01];
-const FEW_ERRORS: &[f64] = &[0.08, 0.03, 0.015];
+const FEW_ERRORS: &[f64] = &[0.08, 0.03];
 /// Of the converged bake in a quick report: as long as in the other studies, so that they share it.
-pub(super) const REFERENCE_SECONDS: f64 = 1.5;
+pub(super) const REFERENCE_SECONDS: f64 = 1.0;
 /// Texels along a patch: the quality's own is 4.
 const PATCHES: &[f32] = &[16.0, 8.0, 4.0, 2.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];

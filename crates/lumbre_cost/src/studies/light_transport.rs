@@ -22,10 +22,10 @@ use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Sp
 
 /// Paths a pixel.
 const PATHS: &[u32] = &[4, 16, 32];
-const FEW_PATHS: &[u32] = &[2, 8];
+const FEW_PATHS: &[u32] = &[2, 6];
 /// Reflections after which paths are cut short.
 const BOUNCES: &[u32] = &[0, 1, 2, 4, 8];
-const FEW_BOUNCES: &[u32] = &[0, 1, 3];
+const FEW_BOUNCES: &[u32] = &[0, 2];
 const REFLECTIONS: &str = "reflections on the way";
 /// Pictures are this part as wide and high as elsewhere: paths take their time.
 const SMALLER: u32 = 3;

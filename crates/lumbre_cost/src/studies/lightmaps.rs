@@ -24,6 +24,9 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Stu
 /// Texels of the reference; each density below has a quarter of the texels of the one before.
 const TEXELS: f64 = 40_000.0;
 const FEW_TEXELS: f64 = 6_000.0;
+/// Densities, as parts of the densest.
+const PARTS: &[f64] = &[1.0, 2.0, 4.0, 8.0];
+const FEW_PARTS: &[f64] = &[1.0, 2.0, 4.0];
 const DENSITY: &str = "texels along a metre";
 const BYTES: &str = "bytes of textures in that format";
 const BAKE: &str = "baked before, ms";
@@ -127,18 +130,19 @@ fn of_scene(
     let options = bake_options(conditions, scene, conditions.unless_quick(TEXELS, FEW_TEXELS))?;
     let Density::TexelsPerMeter(densest) = options.density else { return Ok(()) };
     let mut all = Vec::new();
-    for (place, halved) in [1.0, 2.0, 4.0, 8.0].into_iter().enumerate() {
+    let parts = conditions.unless_quick(PARTS, FEW_PARTS);
+    for (place, halved) in parts.iter().enumerate() {
         let density = densest / halved;
         let options = BakeOptions { density: Density::TexelsPerMeter(density), error: 0.02, ..options };
-        let told = [place, place + 1].map(|place| part(0.6 * place as f64 / 4.0));
+        let told = [place, place + 1].map(|place| part(0.6 * place as f64 / parts.len() as f64));
         all.push(Maps { baked: bake_scene(conditions, scene, &options, told)?, options, density });
     }
     let mut frames = Vec::new();
     let mut points = Vec::new();
     for (place, maps) in all.iter_mut().enumerate() {
         for format in Format::ALL {
-            // Formats matter alike at every density: the densest two tell.
-            if place > 1 && !matches!(format, Format::Halves) {
+            // Formats matter alike at every density: the densest two tell, or the densest alone.
+            if place > conditions.unless_quick(1, 0) && !matches!(format, Format::Halves) {
                 continue;
             }
             let (world, sizes) = in_format(conditions, scene, &mut maps.baked.world, format)?;

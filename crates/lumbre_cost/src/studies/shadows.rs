@@ -20,6 +20,8 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 /// Texels beside the usual number, along a side of a map.
 const RESOLUTIONS: &[f32] = &[0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 const FEW_RESOLUTIONS: &[f32] = &[0.25, 1.0, 4.0];
+/// Of maps that are drawn anew.
+const FEW_ANEW: &[f32] = &[1.0, 4.0];
 const RESOLUTION: &str = "texels of the maps beside the usual number, along a side";
 const WITHOUT: &str = "no shadows";
 const ANEW: &str = "soft, all maps drawn anew";
@@ -87,7 +89,7 @@ fn asked(conditions: &Conditions<'_>) -> Vec<Asked> {
             all.push(Asked { settings, ..usual });
         }
     }
-    for &shadow_resolution in resolutions {
+    for &shadow_resolution in conditions.unless_quick(RESOLUTIONS, FEW_ANEW) {
         let settings = FrameSettings { shadow_resolution, ..usual.settings };
         all.push(Asked { settings, moving: true, ..usual });
     }

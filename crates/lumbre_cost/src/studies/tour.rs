@@ -20,7 +20,7 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 
 /// Cameras of a file that are looked through, at most.
 const STOPS: usize = 16;
-const FEW_STOPS: usize = 2;
+const FEW_STOPS: usize = 1;
 /// For the frames of one camera.
 const SECONDS: f64 = 6.0;
 
@@ -126,7 +126,7 @@ fn of_scene(
     let most = conditions.unless_quick(STOPS, FEW_STOPS).min(stops.len());
     if most < stops.len() {
         measured.study.notes.push(format!(
-            "{} has {} cameras; the first {most} were looked through.",
+            "{} has {} cameras, of which the first {most} stand here.",
             scene.name,
             stops.len()
         ));
@@ -143,10 +143,10 @@ fn of_scene(
     }
     let most_often = (1..CHANGES.len()).max_by_key(|change| best[*change]).filter(|change| best[*change] > 0);
     if let Some(change) = most_often {
-        measured
-            .study
-            .findings
-            .push(format!("Of {most} cameras {} would gain most by {}.", best[change], CHANGES[change].name));
+        measured.study.findings.push(format!(
+            "{} of the cameras looked through ({most}) would gain most by {}.",
+            best[change], CHANGES[change].name
+        ));
     }
     Ok(())
 }
