@@ -11,7 +11,7 @@ use lumbre_scene::{Camera, Mesh, Name, Projection, SceneSettings, Transform};
 /// Subdivisions of the balls of a row, from left to right: 256 to 4,096 triangles.
 const DEPTHS: std::ops::RangeInclusive<u32> = 3..=5;
 /// Rows by what they are called, the height and depth of their middle in metres, and the distance from ball to ball.
-const ROWS: [(&str, f64, f64, f64); 2] = [("near", 0.5, 0.0, 1.1), ("far", 3.6, -9.0, 1.5)];
+const ROWS: [(&str, f64, f64, f64); 2] = [("near", 0.5, 0.0, 1.1), ("far", 3.0, -9.0, 1.5)];
 const RADIUS: f32 = 0.45;
 
 /// The balls, under a sun and a weaker light from the other side.

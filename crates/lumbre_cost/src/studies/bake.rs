@@ -22,6 +22,9 @@ use crate::{Conditions, CostError, Plot, Point, Quantity, Spread, Study};
 /// Errors that are asked for, as shares.
 const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01];
 const FEW_ERRORS: &[f64] = &[0.08, 0.03];
+/// The error that bakes of other studies are asked for, in a full and in a quick report.
+pub(super) const ERROR: f64 = 0.02;
+pub(super) const QUICK_ERROR: f64 = 0.06;
 /// Of the converged bake in a quick report: as long as in the other studies, so that they share it.
 pub(super) const REFERENCE_SECONDS: f64 = 1.0;
 /// Texels along a patch: the quality's own is 4.

@@ -22,7 +22,7 @@ const FEW: &[u32] = &[1, 16, 128];
 /// Where the lamps of the first part end: the part of white that they bring there.
 const USUAL: f32 = 0.1;
 const THRESHOLDS: &[f32] = &[0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002];
-const FEW_THRESHOLDS: &[f32] = &[0.1, 0.02, 0.005];
+const FEW_THRESHOLDS: &[f32] = &[0.1, 0.01];
 /// With more lamps to draw a frame takes longer than to compile its shaders.
 const SHARING: u32 = 64;
 const LAMPS: &str = "lamps";

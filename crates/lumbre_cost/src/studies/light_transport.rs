@@ -7,6 +7,7 @@ use lumbre_bake::BakeOptions;
 use lumbre_render::FrameOptions;
 use lumbre_trace::{Integrator, TraceOptions};
 
+use super::bake::{ERROR, QUICK_ERROR};
 use super::over_scenes;
 use crate::baked::{Baked, bake_arguments, bake_options, bake_scene, nothing_to_bake};
 use crate::findings::{cheapest_by_error, error_of, milliseconds, percent, rounds, times_of};
@@ -92,7 +93,7 @@ fn of_scene(
     conditions.tell(part(0.5))?;
 
     let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 700.0))?;
-    let bake = BakeOptions { error: 0.02, ..bake };
+    let bake = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..bake };
     let baked: Option<Baked> = match nothing_to_bake(conditions, scene)? {
         None => Some(bake_scene(conditions, scene, &bake, [part(0.5), part(0.6)])?),
         Some(why) => {

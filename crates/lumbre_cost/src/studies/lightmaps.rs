@@ -10,6 +10,7 @@ use lumbre_scene::{
     lightmap_to_open_exr,
 };
 
+use super::bake::{ERROR, QUICK_ERROR};
 use super::over_scenes;
 use crate::baked::{Baked, bake_arguments, bake_options, bake_scene, nothing_to_bake};
 use crate::findings::{listed, percent, rounded, short};
@@ -23,7 +24,7 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Stu
 
 /// Texels of the reference; each density below has a quarter of the texels of the one before.
 const TEXELS: f64 = 40_000.0;
-const FEW_TEXELS: f64 = 6_000.0;
+const FEW_TEXELS: f64 = 4_000.0;
 /// Densities, as parts of the densest.
 const PARTS: &[f64] = &[1.0, 2.0, 4.0, 8.0];
 const FEW_PARTS: &[f64] = &[1.0, 2.0, 4.0];
@@ -131,9 +132,10 @@ fn of_scene(
     let Density::TexelsPerMeter(densest) = options.density else { return Ok(()) };
     let mut all = Vec::new();
     let parts = conditions.unless_quick(PARTS, FEW_PARTS);
+    let error = conditions.unless_quick(ERROR, QUICK_ERROR);
     for (place, halved) in parts.iter().enumerate() {
         let density = densest / halved;
-        let options = BakeOptions { density: Density::TexelsPerMeter(density), error: 0.02, ..options };
+        let options = BakeOptions { density: Density::TexelsPerMeter(density), error, ..options };
         let told = [place, place + 1].map(|place| part(0.6 * place as f64 / parts.len() as f64));
         all.push(Maps { baked: bake_scene(conditions, scene, &options, told)?, options, density });
     }

@@ -13,7 +13,7 @@ use lumbre_scene::{
     hidden_entities,
 };
 
-use super::bake::REFERENCE_SECONDS;
+use super::bake::{ERROR, QUICK_ERROR, REFERENCE_SECONDS};
 use super::over_scenes;
 use crate::baked::{
     Baked, bake_arguments, bake_options, bake_world, maps_of, nothing_to_bake, picture_of_maps, texel_error,
@@ -99,7 +99,10 @@ fn of_scene(
 /// What bakes are asked for, of a level that is so many times as large as one room.
 fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Result<BakeOptions, CostError> {
     let texels = rooms * conditions.unless_quick(10_000.0, 700.0);
-    Ok(BakeOptions { error: 0.02, ..bake_options(conditions, scene, texels)? })
+    Ok(BakeOptions {
+        error: conditions.unless_quick(ERROR, QUICK_ERROR),
+        ..bake_options(conditions, scene, texels)?
+    })
 }
 
 fn reference_time(conditions: &Conditions<'_>) -> Duration {
