@@ -76,12 +76,18 @@ fn program() -> anyhow::Result<PathBuf> {
     Ok(program)
 }
 
-/// The times of the frames that a command draws.
-fn timed(program: &Path, words: &[String], folder: &Path) -> anyhow::Result<Spread> {
+/// Runs a command in the folder of a report.
+fn run(program: &Path, words: &[String], folder: &Path) -> anyhow::Result<()> {
     let output = Command::new(program).args(&words[1..]).current_dir(folder).output()?;
     if !output.status.success() {
         bail!("{}: {}", words.join(" "), String::from_utf8_lossy(&output.stderr));
     }
+    Ok(())
+}
+
+/// The times of the frames that a command draws.
+fn timed(program: &Path, words: &[String], folder: &Path) -> anyhow::Result<Spread> {
+    run(program, words, folder)?;
     let timings: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.join("times.json"))?)?;
     let frames = timings["frames"].as_array().context("no frames in times.json")?;
     let times: Vec<f64> = frames.iter().skip(COLD).filter_map(|frame| frame["wall_ms"].as_f64()).collect();

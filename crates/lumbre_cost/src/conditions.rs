@@ -45,7 +45,7 @@ pub struct Conditions<'a> {
     /// Scenes that were given; without any a study makes its own.
     pub files: &'a [PathBuf],
     /// Frames are timed as a window shows them, with a tone curve, in eight bits. Otherwise as their pictures are drawn, in linear light and floats: then a picture and its time come from the same
-    /// pipelines, which a software rasterizer takes longer to compile than to draw with, and `lumbre render -o frame.exr --timings` times the same.
+    /// pipelines, which a software rasterizer takes longer to compile than to draw with a few times.
     pub as_shown: bool,
     /// Who is told.
     pub listener: &'a Listener<'a>,
@@ -82,6 +82,18 @@ impl Conditions<'_> {
     /// How often work is done that takes too long for rounds by time: as often as its times have to be repeated to be told apart, and once for counts alone.
     pub fn repetitions(&self) -> usize {
         if self.counts_only { 1 } else { Spread::FEWEST_ROUNDS_THAT_TELL }
+    }
+
+    /// The command that draws a file's frame as a study draws it, for its picture and for its time. `arguments` are what is asked for besides, each with a space before it.
+    pub fn drawing(&self, file: &str, arguments: &str) -> String {
+        let asked = format!("{arguments} --size {}", self.size_text());
+        let timed = "--frames 20 --timings times.json";
+        match self.as_shown {
+            true => format!(
+                "lumbre render {file} -o frame.exr{asked} && lumbre render {file} -o frame.png{asked} {timed}"
+            ),
+            false => format!("lumbre render {file} -o frame.exr{asked} {timed}"),
+        }
     }
 
     /// The command that runs a study again as it was run for this report, in the folder of the report.

@@ -93,7 +93,7 @@ pub fn measure(
             counts_only: options.counts_only,
             size: options.size,
             size_of_report: options.size,
-            as_shown: false,
+            as_shown: !options.quick,
             seed: options.seed,
             folder: folder.path(),
             files: &options.files,

@@ -121,11 +121,9 @@ fn point(
         milliseconds: frame.spread(),
         counts: frame.counts(),
         figures: figures.into_iter().flatten().collect(),
-        command: format!(
-            "lumbre render {} -o frame.exr{} --size {} --frames 20 --timings times.json",
+        command: conditions.drawing(
             scene.in_commands(),
-            without.map_or_else(String::new, |effect| format!(" --without {}", quoted(effect))),
-            conditions.size_text()
+            &without.map_or_else(String::new, |effect| format!(" --without {}", quoted(effect))),
         ),
         ..Point::default()
     }

@@ -124,8 +124,7 @@ fn of_scene(
     for ((label, more), frame) in labels.zip(more).zip(&drawn) {
         let with_lightmaps = label == WITH_LIGHTMAPS;
         let file = if with_lightmaps { "baked.glb" } else { scene.in_commands() };
-        let draw =
-            format!("lumbre render {file} -o frame.exr --size {size}{more} --frames 20 --timings times.json");
+        let draw = conditions.drawing(file, more);
         let point = Point {
             series: series("frame"),
             label: label.to_owned(),

@@ -211,10 +211,10 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Fo
     // Frames read the half floats that stand beside a packed file.
     let command = match format {
         Format::Halves => format!(
-            "lumbre bake {} -o baked.glb {} --exr half && lumbre render baked.glb -o frame.exr --size {} --frames 20 --timings times.json",
+            "lumbre bake {} -o baked.glb {} --exr half && {}",
             scene.in_commands(),
             bake_arguments(&maps.options),
-            conditions.size_text()
+            conditions.drawing("baked.glb", "")
         ),
         Format::Packed(_) => conditions.again("lightmaps"),
     };

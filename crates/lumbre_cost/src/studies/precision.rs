@@ -73,10 +73,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
             command,
             ..Point::default()
         };
-        let draw = format!(
-            "lumbre render {} -o frame.exr --size {size} --frames 20 --timings times.json",
-            scene.in_commands()
-        );
+        let draw = conditions.drawing(scene.in_commands(), "");
         let trace = format!(
             "lumbre trace {} -o picture.exr --size {size} --depth 0 --no-shadows",
             scene.in_commands()

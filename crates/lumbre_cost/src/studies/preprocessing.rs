@@ -204,20 +204,14 @@ fn frames(
     let labels = ["by lamps alone", "with the best ambient light", "with lightmaps"];
     for (label, frame) in labels.into_iter().zip(&drawn) {
         let has_lightmaps = label == labels[2];
-        let render = |file: &str| {
-            format!(
-                "lumbre render {file} -o frame.exr --size {} --frames 20 --timings times.json",
-                conditions.size_text()
-            )
-        };
         let command = match has_lightmaps {
             true => format!(
                 "lumbre bake {} -o baked.glb {} && {}",
                 scene.in_commands(),
                 bake_arguments(options),
-                render("baked.glb")
+                conditions.drawing("baked.glb", "")
             ),
-            false if label == labels[0] => render(scene.in_commands()),
+            false if label == labels[0] => conditions.drawing(scene.in_commands(), ""),
             // A file's ambient light cannot be told to `lumbre render`.
             false => conditions.again("preprocessing"),
         };

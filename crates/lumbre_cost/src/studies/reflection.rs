@@ -132,12 +132,7 @@ fn point(
         milliseconds: frame.spread(),
         counts: frame.counts(),
         figures: over_incidences.collect(),
-        command: format!(
-            "lumbre render {} -o frame.exr --reflection {} --size {} --frames 20 --timings times.json",
-            scene.in_commands(),
-            variant.model.name(),
-            conditions.size_text()
-        ),
+        command: conditions.drawing(scene.in_commands(), &format!(" --reflection {}", variant.model.name())),
         ..Point::default()
     }
 }

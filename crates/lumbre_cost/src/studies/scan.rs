@@ -130,12 +130,7 @@ fn point(
         parameters: cells.map(|cells| (RESOLUTION.to_owned(), f64::from(cells))).into_iter().collect(),
         milliseconds: frame.spread(),
         counts: frame.counts(),
-        command: format!(
-            "lumbre render {} -o frame.exr --shading {} --no-shadows --size {} --frames 20 --timings times.json",
-            subject.in_commands(),
-            shading.name(),
-            conditions.size_text()
-        ),
+        command: conditions.drawing(subject.in_commands(), &format!(" --shading {shading} --no-shadows")),
         ..Point::default()
     }
 }

@@ -139,12 +139,8 @@ pub(super) fn series_of(shading: Shading) -> &'static str {
 }
 
 fn point(conditions: &Conditions<'_>, subject: &Subject, shading: Shading, frame: &DrawnFrame) -> Point {
-    let name = shading.name();
-    let command = format!(
-        "lumbre render {} -o frame.exr --shading {name} --no-shadows --size {} --frames 20 --timings times.json",
-        subject.scene.in_commands(),
-        conditions.size_text()
-    );
+    let asked = format!(" --shading {shading} --no-shadows");
+    let command = conditions.drawing(subject.scene.in_commands(), &asked);
     Point {
         series: series_of(shading).into(),
         label: subject.label.clone(),

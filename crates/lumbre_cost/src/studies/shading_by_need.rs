@@ -98,11 +98,7 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, shading: Shading, frame
         parameters: bound.map(|bound| (BOUND.to_owned(), bound)).into_iter().collect(),
         milliseconds: frame.spread(),
         counts,
-        command: format!(
-            "lumbre render {} -o frame.exr --shading {shading} --size {} --frames 20 --timings times.json",
-            scene.in_commands(),
-            conditions.size_text()
-        ),
+        command: conditions.drawing(scene.in_commands(), &format!(" --shading {shading}")),
         ..Point::default()
     }
 }

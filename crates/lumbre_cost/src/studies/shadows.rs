@@ -196,11 +196,7 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, asked: &Asked, frame: &
         counts: frame.counts(),
         command: match asked.moving {
             true => conditions.again("shadows"),
-            false => format!(
-                "lumbre render {} -o frame.exr {arguments} --size {} --frames 20 --timings times.json",
-                scene.in_commands(),
-                conditions.size_text()
-            ),
+            false => conditions.drawing(scene.in_commands(), &format!(" {arguments}")),
         },
         ..Point::default()
     }

@@ -183,13 +183,8 @@ fn of_camera(
             label: change.name.to_owned(),
             milliseconds: frame.spread(),
             counts: frame.counts(),
-            command: format!(
-                "lumbre render {} -o frame.exr --camera {}{} --size {} --frames 20 --timings times.json",
-                scene.in_commands(),
-                quoted(stop),
-                change.arguments,
-                conditions.size_text()
-            ),
+            command: conditions
+                .drawing(scene.in_commands(), &format!(" --camera {}{}", quoted(stop), change.arguments)),
             ..Point::default()
         };
         measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
