@@ -438,7 +438,7 @@ pub struct Cost {
     /// Keeps the studies that DIR holds already, if they are of this machine, these scenes and settings.
     #[arg(long)]
     pub resume: bool,
-    /// Width and height of the pictures in pixels; 480x270 without this, with --quick 208x117.
+    /// Width and height of the pictures in pixels; 480x270 without this, with --quick 240x135.
     #[arg(long, value_name = "WxH", value_parser = picture_size, allow_negative_numbers = true)]
     pub size: Option<(u32, u32)>,
     /// Of everything that draws random numbers.

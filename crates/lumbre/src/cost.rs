@@ -17,7 +17,7 @@ use crate::interruption::Interruption;
 use crate::progress::Shown;
 
 /// Width and height of the pictures where none is asked for: whole, and quick.
-const SIZES: [(u32, u32); 2] = [(480, 270), (208, 117)];
+const SIZES: [(u32, u32); 2] = [(480, 270), (240, 135)];
 
 /// Runs the command.
 pub fn run(asked: &Cost) -> anyhow::Result<()> {

@@ -14,7 +14,7 @@ use crate::rounds::Rounds;
 use crate::{CostError, Spread};
 
 /// By which factor the frames of a quick report have less time than those of a full one.
-const QUICK: f64 = 24.0;
+const QUICK: f64 = 14.0;
 
 /// Who is told how much of a study is done, 0 to 1, or nothing new, and says whether to go on. Called from any thread.
 pub type Listener<'a> = dyn Fn(Option<f64>) -> ControlFlow<()> + Sync + 'a;

@@ -28,7 +28,7 @@ pub(super) const QUICK_ERROR: f64 = 0.06;
 /// Of the converged bake in a quick report: as long as in the other studies, so that they share it.
 pub(super) const REFERENCE_SECONDS: f64 = 1.0;
 /// Texels along a patch: the quality's own is 4.
-const PATCHES: &[f32] = &[16.0, 8.0, 4.0, 2.0];
+const PATCHES: &[f32] = &[16.0, 8.0, 2.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];
 const PATCH: &str = "texels along a patch";
 const ASKED: &str = "error asked for, %";
@@ -101,7 +101,7 @@ fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
         all.push(Asked { series: "patches", label: format!("{texels} texels a side"), options, more: "" });
     }
     // What bakes without smoothing cannot be asked for on the command line.
-    for &error in errors.iter().take(conditions.unless_quick(3, 1)) {
+    for &error in errors.iter().take(conditions.unless_quick(2, 1)) {
         let options = BakeOptions { error, denoise: false, ..options };
         all.push(Asked { series: "without smoothing", label: label(error), options, more: "" });
     }
@@ -118,10 +118,10 @@ fn of_scene(
         measured.study.notes.push(why);
         return Ok(());
     }
-    let options = bake_options(conditions, scene, conditions.unless_quick(4_000.0, 700.0))?;
+    let options = bake_options(conditions, scene, conditions.unless_quick(2_500.0, 700.0))?;
     let part = |share: f64| before + share * (after - before);
     let options_of_truth =
-        converged(conditions, &options, conditions.reference_time(25.0, REFERENCE_SECONDS));
+        converged(conditions, &options, conditions.reference_time(12.0, REFERENCE_SECONDS));
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.0), part(0.4)])?;
     measured.study.notes.push(format!(
         "The converged bake of the {} took {:.0} s and states {} of its mean for itself.",

@@ -15,7 +15,7 @@ use crate::scenes::{Air, every_effect, room};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Seconds for the frames of each scene of a full report.
-const SECONDS: f64 = 16.0;
+const SECONDS: f64 = 9.0;
 /// Of the lightmaps of the room.
 const TEXELS: f64 = 4_000.0;
 /// Effects that are told of, the costliest.
@@ -27,6 +27,9 @@ const SAVED: &str = "saved, ms";
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    // A frame for each of many effects, most of which have shaders of their own.
+    let size = [conditions.size.0, conditions.size.1].map(|side| (2 * side / 3).max(8));
+    let conditions = &Conditions { size: (size[0], size[1]), ..*conditions };
     let mut measured = Measured { study: study(), ..Measured::default() };
     let scenes = match conditions.files.is_empty() {
         true => vec![of_its_own(conditions)?],
@@ -77,12 +80,13 @@ fn of_scene(
 ) -> Result<(), CostError> {
     let mut whole = scene.open(conditions.aspect())?;
     let effects = removable_effects(&Census::of(&mut whole), &FrameOptions::default());
-    let counting = |frame: Frame| frame.sharing("effects").counting_lights(!conditions.quick);
-    let mut frames = vec![counting(Frame::new(whole, FrameOptions::default()))];
+    // Variants that count are compiled for nothing else: here for the whole frame alone.
+    let whole = Frame::new(whole, FrameOptions::default()).sharing("effects");
+    let mut frames = vec![whole.counting_lights(!conditions.quick)];
     for effect in &effects {
         let (mut world, mut options) = (scene.open(conditions.aspect())?, FrameOptions::default());
         effect.remove(&mut world, &mut options);
-        frames.push(counting(Frame::new(world, options)));
+        frames.push(Frame::new(world, options).sharing("effects"));
     }
     let drawn = draw_frames(conditions, frames, SECONDS, told)?;
     let [whole, without @ ..] = &drawn[..] else { return Ok(()) };

@@ -35,7 +35,7 @@ const TILE: &str = "pixels along a tile";
 const SIZED: &str = "clusters by size";
 const ENDING: &str = "lamps that end, by clusters";
 /// Seconds for the frames of each part of a full report.
-const SECONDS: f64 = 14.0;
+const SECONDS: f64 = 8.0;
 /// Relative RMSE that f32 leaves where a thousand lamps are added in another order: a thousand times half of its unit in the last place.
 const ROUNDING: f64 = 6e-5;
 

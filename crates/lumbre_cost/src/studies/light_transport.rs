@@ -22,10 +22,10 @@ use crate::traced::{ray_tree, traced};
 use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Paths a pixel.
-const PATHS: &[u32] = &[4, 16, 32];
+const PATHS: &[u32] = &[4, 16];
 const FEW_PATHS: &[u32] = &[2, 6];
 /// Reflections after which paths are cut short.
-const BOUNCES: &[u32] = &[0, 1, 2, 4, 8];
+const BOUNCES: &[u32] = &[0, 1, 2, 4];
 const FEW_BOUNCES: &[u32] = &[0, 2];
 const REFLECTIONS: &str = "reflections on the way";
 /// Pictures are this part as wide and high as elsewhere: paths take their time.
@@ -84,7 +84,7 @@ fn of_scene(
         samples: Some(samples),
         ..TraceOptions::default()
     };
-    let most = conditions.unless_quick(256, 32);
+    let most = conditions.unless_quick(128, 48);
     let (picture, report) = traced(conditions, scene, &paths(most))?;
     // The report states it of the mean; errors are of the root mean square.
     let open = report.standard_error.unwrap_or(0.0) * mean_over_root_mean_square(&picture);
@@ -92,7 +92,7 @@ fn of_scene(
     let uncertain = Some(ErrorOf { uncertainty: open, ..ErrorOf::default() });
     conditions.tell(part(0.5))?;
 
-    let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 700.0))?;
+    let bake = bake_options(conditions, scene, conditions.unless_quick(4_000.0, 700.0))?;
     let bake = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..bake };
     let baked: Option<Baked> = match nothing_to_bake(conditions, scene)? {
         None => Some(bake_scene(conditions, scene, &bake, [part(0.5), part(0.6)])?),

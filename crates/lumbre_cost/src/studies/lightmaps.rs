@@ -23,7 +23,7 @@ use crate::scenes::Air;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Texels of the reference; each density below has a quarter of the texels of the one before.
-const TEXELS: f64 = 40_000.0;
+const TEXELS: f64 = 20_000.0;
 const FEW_TEXELS: f64 = 4_000.0;
 /// Densities, as parts of the densest.
 const PARTS: &[f64] = &[1.0, 2.0, 4.0, 8.0];
@@ -31,7 +31,7 @@ const FEW_PARTS: &[f64] = &[1.0, 2.0, 4.0];
 const DENSITY: &str = "texels along a metre";
 const BYTES: &str = "bytes of textures in that format";
 const BAKE: &str = "baked before, ms";
-const SECONDS: f64 = 8.0;
+const SECONDS: f64 = 5.0;
 
 /// How texels are kept on the GPU, and in which file.
 #[derive(Clone, Copy)]

@@ -30,7 +30,7 @@ const CASES: [(&str, Sheet); 7] = [
     ("a millimetre large", Sheet { scale: 5e-4, ..Sheet::PLAIN }),
     ("100 km large", Sheet { scale: 5e4, ..Sheet::PLAIN }),
 ];
-const SECONDS: f64 = 6.0;
+const SECONDS: f64 = 4.0;
 const F32: &str = "f32 frame";
 const F16: &str = "the frame kept in f16";
 const EIGHT: &str = "the frame kept in eight bits";

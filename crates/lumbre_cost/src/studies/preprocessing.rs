@@ -98,7 +98,7 @@ fn of_scene(
 
 /// What bakes are asked for, of a level that is so many times as large as one room.
 fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Result<BakeOptions, CostError> {
-    let texels = rooms * conditions.unless_quick(10_000.0, 700.0);
+    let texels = rooms * conditions.unless_quick(4_000.0, 700.0);
     Ok(BakeOptions {
         error: conditions.unless_quick(ERROR, QUICK_ERROR),
         ..bake_options(conditions, scene, texels)?
@@ -106,7 +106,7 @@ fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Res
 }
 
 fn reference_time(conditions: &Conditions<'_>) -> Duration {
-    conditions.reference_time(10.0, REFERENCE_SECONDS)
+    conditions.reference_time(8.0, REFERENCE_SECONDS)
 }
 
 /// Moves something of a scene, and bakes it whole and from what a former bake has kept.

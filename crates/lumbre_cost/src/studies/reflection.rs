@@ -34,7 +34,7 @@ struct Variant {
 const INCIDENCES: [f64; 4] = [0.0, 30.0, 60.0, 80.0];
 /// Fine enough for its facets not to be seen.
 const DEPTH: u32 = 6;
-const SECONDS: f64 = 16.0;
+const SECONDS: f64 = 8.0;
 
 /// Measures it.
 ///

@@ -17,7 +17,7 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 /// Depths of the spheres.
 const DEPTHS: std::ops::RangeInclusive<u32> = 0..=7;
 /// Seconds for the frames of a full report.
-const SECONDS: f64 = 24.0;
+const SECONDS: f64 = 14.0;
 const DEPTH: &str = "depth of subdivision";
 
 /// Measures it.
@@ -33,7 +33,8 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         for &shading in Shading::ALL {
             let world = subject.scene.open(conditions.aspect())?;
             let options = FrameOptions { shading: Some(shading), shadows: false, ..FrameOptions::default() };
-            frames.push(Frame::new(world, options).sharing(shading.name()));
+            let frame = Frame::new(world, options).sharing(shading.name());
+            frames.push(frame.counting_lights(!conditions.quick));
         }
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [0.1, 1.0])?;

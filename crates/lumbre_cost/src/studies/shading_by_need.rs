@@ -16,7 +16,7 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 /// Errors that are allowed, in displayed light from 0 to 1.
 const BOUNDS: &[f32] = &[0.001, 0.003, 0.01, 0.03, 0.1, 0.3];
 const FEW_BOUNDS: &[f32] = &[0.01, 0.1];
-const SECONDS: f64 = 8.0;
+const SECONDS: f64 = 6.0;
 const BOUND: &str = "error allowed";
 const BY_NEED: &str = "by need";
 

@@ -27,7 +27,7 @@ const WITHOUT: &str = "no shadows";
 const ANEW: &str = "soft, all maps drawn anew";
 /// Lamps without a size that stand for those with one, of all of them together: their shadows end in steps of one of them.
 const PIECES: u32 = 256;
-const SECONDS: f64 = 16.0;
+const SECONDS: f64 = 9.0;
 /// Of a file whose lamps ask for no shadows, so many do for the study.
 const MADE_TO_ASK: usize = 3;
 

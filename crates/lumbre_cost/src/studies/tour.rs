@@ -22,7 +22,7 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 const STOPS: usize = 16;
 const FEW_STOPS: usize = 1;
 /// For the frames of one camera.
-const SECONDS: f64 = 6.0;
+const SECONDS: f64 = 4.0;
 
 /// A frame as it is, with more, or with less.
 struct Change {
