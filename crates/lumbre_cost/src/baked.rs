@@ -159,7 +159,7 @@ const NOISE_KNOWN_TO: f64 = 0.2;
 
 /// How far texels are from those of a reference of the same maps: root mean square and largest difference, relative to the reference's mean, over the texels
 /// that show a surface in both. The reference's own noise, as it states it, is known and independent, and is taken off; what is left open is that a
-/// fifth of it is not so well known. Nothing where the maps are not the same.
+/// fifth of it is not so well known. Where the noise explains all of the difference, the error may be anything up to the difference itself. Nothing where the maps are not the same.
 pub fn texel_error(found: &Maps, reference: &Maps) -> Option<ErrorOf> {
     let (mut squares, mut noise, mut sum, mut largest, mut count) = (0.0, 0.0, 0.0, 0.0_f64, 0.0);
     for (name, (wanted, wanted_errors)) in reference {
@@ -186,12 +186,12 @@ pub fn texel_error(found: &Maps, reference: &Maps) -> Option<ErrorOf> {
     let mean = (sum / count).max(f64::MIN_POSITIVE);
     let without = |noise: f64| ((squares - noise).max(0.0) / count).sqrt() / mean;
     let [most, least] = [1.0 - NOISE_KNOWN_TO, 1.0 + NOISE_KNOWN_TO].map(|part| without(noise * part * part));
-    Some(ErrorOf {
-        relative_rmse: without(noise),
-        largest: largest / mean,
-        flip: None,
-        uncertainty: 0.5 * (most - least),
-    })
+    let relative_rmse = without(noise);
+    let uncertainty = match relative_rmse > 0.0 {
+        true => (most - relative_rmse).max(relative_rmse - least),
+        false => without(0.0),
+    };
+    Some(ErrorOf { relative_rmse, largest: largest / mean, flip: None, uncertainty })
 }
 
 #[cfg(test)]
@@ -224,6 +224,11 @@ mod tests {
         // A map without error against a noisy reference that knows its noise.
         let none = texel_error(&truth, &noisy(0.05)).expect("the maps are alike");
         assert!(none.relative_rmse < 1e-3 && none.uncertainty > 0.01, "{none:?}");
+        // A reference that states more noise than there is any difference tells only that the error is no larger than that.
+        let unsure = texel_error(&truth, &maps(noisy(0.05)["floor"].0.texels.clone(), 0.2))
+            .expect("the maps are alike");
+        assert_eq!(unsure.relative_rmse, 0.0);
+        assert!((unsure.uncertainty - 0.05).abs() < 1e-3, "{unsure:?}");
         assert_eq!(texel_error(&truth, &maps(vec![Vec3::ONE; 50], 0.0)), None);
     }
 }

@@ -1,8 +1,6 @@
 //! Light that bounces, before the game or in it: what it costs a frame when it was baked, what baking takes, and what it takes again when something of the
 //! level has moved. Not how good a bake of which price is: that is `bake`.
 
-use std::time::Duration;
-
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_bake::BakeOptions;
@@ -32,6 +30,8 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Stu
 const SECONDS: f64 = 4.0;
 /// What moves goes by this part of its longest side.
 const STEP: f64 = 0.1;
+/// Of the converged bake of two rooms in a quick report.
+const REFERENCE_SECONDS_OF_TWO: f64 = 1.5;
 const FRAME: &str = "frame";
 const BAKE: &str = "bake after a change";
 const BEFORE: &str = "baked before, ms";
@@ -75,8 +75,9 @@ fn of_scene(
     }
     let part = |share: f64| before + share * (after - before);
     let options = options_of(conditions, scene, 1.0)?;
+    let options = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..options };
     // Of what is asked for, `error` alone does not matter to it.
-    let options_of_truth = converged(conditions, &options, reference_time(conditions));
+    let options_of_truth = converged(conditions, &options, conditions.reference_time(8.0, REFERENCE_SECONDS));
     let (baked, _) =
         bake_world(conditions, scene.open(conditions.aspect())?, &options, None, [part(0.0), part(0.1)])?;
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.1), part(0.3)])?;
@@ -92,21 +93,17 @@ fn of_scene(
             let options = options_of(conditions, &rooms, 2.0)?;
             after_a_change(conditions, &rooms, &options, [part(0.5), part(1.0)], measured)
         }
-        false => after_a_change(conditions, scene, &options, [part(0.5), part(1.0)], measured),
+        false => {
+            let options = options_of(conditions, scene, 1.0)?;
+            after_a_change(conditions, scene, &options, [part(0.5), part(1.0)], measured)
+        }
     }
 }
 
-/// What bakes are asked for, of a level that is so many times as large as one room.
+/// What bakes are asked for, of a level that is so many times as large as one room. With a larger error hardly any rays would be cast that a former bake could spare.
 fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Result<BakeOptions, CostError> {
     let texels = rooms * conditions.unless_quick(4_000.0, 700.0);
-    Ok(BakeOptions {
-        error: conditions.unless_quick(ERROR, QUICK_ERROR),
-        ..bake_options(conditions, scene, texels)?
-    })
-}
-
-fn reference_time(conditions: &Conditions<'_>) -> Duration {
-    conditions.reference_time(8.0, REFERENCE_SECONDS)
+    Ok(BakeOptions { error: ERROR, ..bake_options(conditions, scene, texels)? })
 }
 
 /// Moves something of a scene, and bakes it whole and from what a former bake has kept.
@@ -135,7 +132,8 @@ fn after_a_change(
         Ok(world)
     };
     let first = measured.study.points.len();
-    let options_of_truth = converged(conditions, options, reference_time(conditions));
+    let time = conditions.reference_time(8.0, REFERENCE_SECONDS_OF_TWO);
+    let options_of_truth = converged(conditions, options, time);
     let (mut truth, _) = bake_world(conditions, changed()?, &options_of_truth, None, [part(0.1), part(0.4)])?;
     let drawn = draw_picture(conditions, &mut truth.world, &FrameOptions::default())?;
     let reference = measured.keep_reference(&format!("{} changed, converged", scene.name), drawn);

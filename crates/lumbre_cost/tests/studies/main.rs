@@ -23,7 +23,7 @@ use lumbre_cost::{
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_render::Gpu;
-use lumbre_scene::{Camera, Mesh, Name, StaticObject, Transform, save};
+use lumbre_scene::{Camera, DynamicObject, Mesh, Name, StaticObject, Transform, save};
 
 fn options(studies: &[&str], files: Vec<PathBuf>) -> CostOptions {
     let names: Vec<String> = studies.iter().map(|name| (*name).to_owned()).collect();
@@ -172,7 +172,7 @@ fn a_file_with_nothing_to_bake_is_said_to_have_nothing() {
         world.query::<&mut Light>().iter_mut(&mut world).for_each(|mut light| light.bake = BakeMode::Dynamic);
         if !is_static {
             for object in objects {
-                world.entity_mut(object).remove::<StaticObject>();
+                world.entity_mut(object).remove::<StaticObject>().insert(DynamicObject);
             }
         }
         world
