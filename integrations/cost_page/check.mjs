@@ -121,7 +121,7 @@ async function pointAt( section ) {
 
 		}
 
-		await figure.locator( '.hit' ).filter( { visible: true } ).first().blur();
+		await figure.evaluate( () => document.activeElement.blur() );
 		if ( await figure.locator( '.tip' ).isVisible() ) found.push( `${ id }, ${ title }: what a point said stays` );
 
 	}

@@ -22,7 +22,7 @@ const RESOLUTIONS: &[f32] = &[0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 const FEW_RESOLUTIONS: &[f32] = &[0.25, 1.0, 4.0];
 /// Of maps that are drawn anew.
 const FEW_ANEW: &[f32] = &[1.0, 4.0];
-const RESOLUTION: &str = "texels of the maps beside the usual number, along a side";
+const RESOLUTION: &str = "texels a side, times the usual number";
 const WITHOUT: &str = "no shadows";
 const ANEW: &str = "soft, all maps drawn anew";
 /// Lamps without a size that stand for those with one, of all of them together: their shadows end in steps of one of them.
