@@ -26,7 +26,7 @@ const FEW_ERRORS: &[f64] = &[0.08, 0.03];
 pub(super) const ERROR: f64 = 0.02;
 pub(super) const QUICK_ERROR: f64 = 0.06;
 /// Of the converged bake in a quick report: as long as in the other studies, so that they share it.
-pub(super) const REFERENCE_SECONDS: f64 = 1.0;
+pub(super) const REFERENCE_SECONDS: f64 = 1.5;
 /// Texels along a patch: the quality's own is 4.
 const PATCHES: &[f32] = &[16.0, 8.0, 2.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];

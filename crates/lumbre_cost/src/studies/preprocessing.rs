@@ -30,8 +30,6 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Stu
 const SECONDS: f64 = 4.0;
 /// What moves goes by this part of its longest side.
 const STEP: f64 = 0.1;
-/// Of the converged bake of two rooms in a quick report.
-const REFERENCE_SECONDS_OF_TWO: f64 = 1.5;
 const FRAME: &str = "frame";
 const BAKE: &str = "bake after a change";
 const BEFORE: &str = "baked before, ms";
@@ -132,7 +130,7 @@ fn after_a_change(
         Ok(world)
     };
     let first = measured.study.points.len();
-    let time = conditions.reference_time(8.0, REFERENCE_SECONDS_OF_TWO);
+    let time = conditions.reference_time(8.0, REFERENCE_SECONDS);
     let options_of_truth = converged(conditions, options, time);
     let (mut truth, _) = bake_world(conditions, changed()?, &options_of_truth, None, [part(0.1), part(0.4)])?;
     let drawn = draw_picture(conditions, &mut truth.world, &FrameOptions::default())?;
