@@ -46,7 +46,8 @@ impl SceneFile {
         let folder = conditions.folder.join("scenes");
         std::fs::create_dir_all(&folder)
             .map_err(|source| CostError::File { path: folder.clone(), source })?;
-        let path = folder.join(name).with_extension("glb");
+        // Not `with_extension`: a name may have a dot in it.
+        let path = folder.join(format!("{name}.glb"));
         save(&mut world, &path)?;
         Ok(Self { name: name.replace('-', " "), path, in_commands: format!("scenes/{name}.glb") })
     }
