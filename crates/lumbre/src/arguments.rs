@@ -426,7 +426,7 @@ pub struct Cost {
     /// Where the report goes: index.html, cost.json, cost.csv, pictures, scenes.
     #[arg(short, long, value_name = "DIR", required_unless_present = "compare", conflicts_with = "compare")]
     pub output: Option<PathBuf>,
-    /// Fewer points and rounds: about two minutes on two cores, instead of six.
+    /// Fewer points, rounds and pixels: some 100 s of CPU time, most of it on both of two cores.
     #[arg(long)]
     pub quick: bool,
     /// Counts alone: nothing is timed, compared or drawn for people, and the report is the same on every machine. What --compare is to watch over without noise.
