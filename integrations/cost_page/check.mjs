@@ -34,6 +34,7 @@ for ( const width of [ 390, 1400 ] ) {
 		}
 
 
+		for ( const section of await page.locator( 'section' ).all() ) faults.push( ...( await pointAt( section ) ).map( ( fault ) => `${ name }: ${ fault }` ) );
 		for ( const viewer of await page.locator( '.viewer' ).all() ) faults.push( ...( await clickThrough( viewer ) ).map( ( fault ) => `${ name }: ${ fault }` ) );
 
 		await page.close();
@@ -85,6 +86,43 @@ function overlappingText() {
 			}
 
 		}
+
+	}
+
+	return found;
+
+}
+
+/** Points at a plot's points, and chooses one: each says what it is within the figure, and the chosen one shows its picture. */
+async function pointAt( section ) {
+
+	const found = [], id = await section.getAttribute( 'id' );
+	for ( const figure of await section.locator( '.plot' ).all() ) {
+
+		const title = await figure.locator( 'figcaption' ).textContent();
+		const hits = figure.locator( '.hit' ).filter( { visible: true } );
+		const count = await hits.count();
+		if ( count === 0 ) found.push( `${ id }, ${ title }: no point answers` );
+		for ( const place of new Set( [ 0, count - 1 ] ) ) {
+
+			if ( place < 0 ) continue;
+			const hit = hits.nth( place ), tip = figure.locator( '.tip' );
+			// Others may lie over it: the keyboard reaches each.
+			await hit.focus();
+			const says = await tip.locator( 'p' ).textContent(), means = await hit.getAttribute( 'data-details' );
+			if ( ! await tip.isVisible() || says !== means ) found.push( `${ id }, ${ title }: a point says "${ says }" in place of "${ means }"` );
+			const reaches = await tip.evaluate( ( tip ) => tip.getBoundingClientRect().right - document.documentElement.clientWidth );
+			if ( reaches > 1 ) found.push( `${ id }, ${ title }: what a point says reaches out of the window by ${ reaches }` );
+			const button = section.locator( `.gallery button[data-point="${ await hit.getAttribute( 'data-point' ) }"]` );
+			if ( await button.count() === 0 ) continue;
+			await hit.press( 'Enter' );
+			const shown = await section.locator( '.pair .picture' ).getAttribute( 'src' );
+			if ( shown !== await button.locator( 'img' ).getAttribute( 'src' ) ) found.push( `${ id }, ${ title }: a chosen point does not show its picture` );
+
+		}
+
+		await figure.evaluate( () => document.activeElement.blur() );
+		if ( await figure.locator( '.tip' ).isVisible() ) found.push( `${ id }, ${ title }: what a point said stays` );
 
 	}
 

@@ -442,7 +442,7 @@ pub struct Cost {
     /// Folder for the report: index.html, cost.json, cost.csv, pictures, scenes.
     #[arg(short, long, value_name = "DIR", required_unless_present = "compare", conflicts_with = "compare")]
     pub output: Option<PathBuf>,
-    /// Fewer points and rounds: about two minutes on two cores, instead of six.
+    /// Fewer points, rounds and pixels: some 100 s of CPU time, most of it on both of two cores.
     #[arg(long)]
     pub quick: bool,
     /// Only count: nothing is timed or compared and no pictures are drawn, and the report is the same on
@@ -455,7 +455,7 @@ pub struct Cost {
     /// Keep the studies that DIR already contains, if they have the same machine, scenes and settings.
     #[arg(long)]
     pub resume: bool,
-    /// Width and height of the pictures in pixels; without this 480x270, or 320x180 with --quick.
+    /// Width and height of the pictures in pixels; without this 480x270, or 240x135 with --quick.
     #[arg(long, value_name = "WxH", value_parser = picture_size, allow_negative_numbers = true)]
     pub size: Option<(u32, u32)>,
     /// Seed of everything that uses random numbers.
@@ -582,6 +582,13 @@ pub struct Frame {
     /// Draw no shadows: every light reaches everything.
     #[arg(long)]
     pub no_shadows: bool,
+    /// Lets every lamp cast a shadow, whether or not the file asks for one.
+    #[arg(long, conflicts_with = "no_shadows")]
+    pub every_shadow: bool,
+    /// Leaves out an effect that the scene calls for, as `lumbre explain` names it, for example "fog" or
+    /// "polygon lights". May be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    pub without: Vec<String>,
     /// Largest number of reflections in flat mirrors: 1 shows a mirror, 2 (the default) a mirror in a mirror;
     /// 0 shows no reflections.
     #[arg(long, value_name = "N")]

@@ -17,7 +17,7 @@ use crate::interruption::Interruption;
 use crate::progress::Shown;
 
 /// Default width and height of the pictures: normally, and with `--quick`.
-const SIZES: [(u32, u32); 2] = [(480, 270), (320, 180)];
+const SIZES: [(u32, u32); 2] = [(480, 270), (240, 135)];
 
 /// Runs the command.
 pub fn run(asked: &Cost) -> anyhow::Result<()> {
@@ -92,11 +92,8 @@ fn compare(asked: &Cost, reports: &[PathBuf]) -> anyhow::Result<()> {
             "note: the two were measured with different settings, so that counts and errors differ by themselves"
         )?;
     }
-    if before.machine != after.machine {
-        writeln!(
-            out,
-            "note: the two were measured on different machines or versions: their times say little"
-        )?;
+    if !before.machine.is_same_place(&after.machine) {
+        writeln!(out, "note: the two were measured on different machines: their times say little")?;
     }
     for change in &changes {
         writeln!(out, "{change}")?;
@@ -105,8 +102,9 @@ fn compare(asked: &Cost, reports: &[PathBuf]) -> anyhow::Result<()> {
     let slower = changes.iter().filter(|change| change.is_slower()).count();
     writeln!(
         out,
-        "{worse} counts, errors or points are worse beyond a factor of {}, and {slower} times",
-        asked.factor
+        "{worse} counts, errors or points are worse beyond a factor of {}, and {slower} times; {} other changes",
+        asked.factor,
+        changes.len() - worse - slower
     )?;
     out.flush().context("standard output")?;
     if worse > 0 || (asked.times && slower > 0) {

@@ -31,7 +31,9 @@ impl Interruption {
             }
         });
         if let Err(error) = handled {
-            eprintln!("lumbre: warning: an interruption will end the work at once, without saving it: {error}");
+            eprintln!(
+                "lumbre: warning: an interruption will end the work at once, without saving it: {error}"
+            );
         }
         Self(state)
     }

@@ -4,9 +4,11 @@ use std::path::Path;
 
 use anyhow::bail;
 use bevy_ecs::prelude::*;
-use lumbre::render::{Display, FrameOptions, Gpu, meter};
+use lumbre::optics::{Light, LightKind};
+use lumbre::render::{Display, FrameOptions, Gpu, meter, removable_effects};
 use lumbre::scene::{
-    self, ActiveCamera, Camera, GlobalTransform, LoadOptions, LoadReport, Name, SceneSettings, SourceFile,
+    self, ActiveCamera, Camera, Census, GlobalTransform, LoadOptions, LoadReport, Name, SceneSettings,
+    SourceFile,
 };
 
 use crate::arguments::{Exposure, Frame, Reading};
@@ -120,7 +122,12 @@ pub fn frame_options(
     settings.light_threshold = frame.light_threshold.unwrap_or(settings.light_threshold);
     settings.shadow_resolution = frame.shadow_resolution.unwrap_or(settings.shadow_resolution);
     settings.shadow_filter = frame.shadow_filter.unwrap_or(settings.shadow_filter);
-    Ok(FrameOptions {
+    if frame.every_shadow {
+        let mut lights = world.query::<&mut Light>();
+        let lamps = lights.iter_mut(world).filter(|light| light.kind != LightKind::Ambient);
+        lamps.for_each(|mut light| light.shadow = true);
+    }
+    let mut options = FrameOptions {
         camera: Some(camera),
         shading: frame.shading,
         reflection: frame.reflection,
@@ -144,7 +151,22 @@ pub fn frame_options(
         },
         full_precision: display != Display::Srgb,
         ..FrameOptions::default()
-    })
+    };
+    for name in &frame.without {
+        leave_out(world, &mut options, name)?;
+    }
+    Ok(options)
+}
+
+/// Takes an effect out of a World, or out of the options of its frame.
+fn leave_out(world: &mut World, options: &mut FrameOptions, name: &str) -> anyhow::Result<()> {
+    let removable = removable_effects(&Census::of(world), options);
+    if let Some(effect) = removable.iter().find(|effect| effect.effect == name) {
+        effect.remove(world, options);
+        return Ok(());
+    }
+    let names: Vec<&str> = removable.iter().map(|effect| effect.effect).collect();
+    bail!("there is no effect `{name}` to leave out; the scene calls for: {}", names.join(", "))
 }
 
 /// Returns the camera with a name or index, or else the active or first one, or a new one that sees

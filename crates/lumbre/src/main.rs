@@ -15,6 +15,8 @@ mod picture_files;
 mod play;
 mod progress;
 mod render;
+#[cfg(test)]
+mod report_commands;
 mod trace;
 mod tune;
 

@@ -2,15 +2,16 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::Arc;
 
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre::cost::{CostReport, read_report};
-use lumbre::optics::{Light, Material, SpotCone};
-use lumbre::scene::{Mesh, Name, SceneSettings, Transform, load, save};
+use lumbre::cost::{CostReport, command_words, read_picture, read_report};
+use lumbre::optics::{Fog, FogMode, Light, Material, SpotCone};
+use lumbre::scene::{Camera, Mesh, Name, SceneSettings, Transform, load, save};
 
 fn lumbre(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lumbre")).args(arguments).output().unwrap()
@@ -35,7 +36,7 @@ fn a_small_report_and_what_changed_since() {
     let asked = ["cost", "-o", text(&report), "--quick", "--study", "reflection", "--size", "24x16"];
     let output = lumbre(&asked);
     assert!(output.status.success(), "{}", stderr(&output));
-    assert!(stdout(&output).contains("Reflection models beside Phong's (10 points"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("Reflection models beside Phong's (12 points"), "{}", stdout(&output));
     assert!(stdout(&output).trim_end().ends_with("index.html"), "{}", stdout(&output));
     assert!(stderr(&output).contains("lumbre: reflection: "), "{}", stderr(&output));
     let found = read_report(&report).unwrap();
@@ -91,6 +92,84 @@ fn a_small_report_and_what_changed_since() {
     assert!(told.status.success() && stdout(&told).contains("and 1 times"), "{}", stdout(&told));
     let failed = lumbre(&["cost", "--compare", text(&json), text(&slower), "--times"]);
     assert_eq!(failed.status.code(), Some(1), "{}", stdout(&failed));
+}
+
+/// A ball on a floor in fog, under a lamp and a spotlight that ask for no shadow.
+fn foggy(path: &Path) {
+    let mut world = World::new();
+    let fog = Fog { mode: FogMode::Exponential { density: 0.05 }, color: Vec3::splat(0.4) };
+    world.insert_resource(SceneSettings { fog: Some(fog), ..SceneSettings::default() });
+    let floor = Mesh(Arc::new(lumbre::mesh::shapes::plane(8.0, 8.0, 1, 1)));
+    world.spawn((Name::new("floor"), floor, Material::matt(Vec3::splat(0.6))));
+    let ball = Mesh(Arc::new(lumbre::mesh::shapes::uv_sphere(0.6, 24, 13)));
+    let shiny = Material::from_metallic_roughness(Vec3::new(0.6, 0.3, 0.2), 0.0, 0.4);
+    world.spawn((Name::new("ball"), ball, shiny, Transform::from_xyz(0.0, 0.9, 0.0)));
+    world.spawn((Name::new("lamp"), Light::point(Vec3::splat(6.0)), Transform::from_xyz(1.0, 3.0, 0.5)));
+    let spot = Light::spot(Vec3::splat(8.0), SpotCone::Smooth { inner: 0.3, outer: 0.5 });
+    let aimed = Transform::from_xyz(-2.0, 3.0, 1.0).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Name::new("spotlight"), spot, aimed));
+    let eye = Transform::from_xyz(0.4, 1.6, 3.5).looking_at(DVec3::new(0.0, 0.6, 0.0), DVec3::Y);
+    world.spawn((Name::new("the eye's place"), Camera::default(), eye));
+    save(&mut world, path).unwrap();
+}
+
+/// Every point of these studies, by its own command: the picture that comes is the one that the report keeps, to the bit.
+#[test]
+fn commands_make_the_pictures_of_their_points_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, report) = (folder.path().join("a foggy yard.glb"), folder.path().join("report"));
+    foggy(&scene);
+    let asked = ["cost", text(&scene), "-o", text(&report), "--quick", "--seed", "3", "--size", "32x24"];
+    let studies = ["--study", "tour", "--study", "effects", "--study", "precision"];
+    let output = lumbre(&[&asked[..], &studies].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let found = read_report(&report).unwrap();
+    let run = |words: &[String]| {
+        let mut words = words[1..].to_vec();
+        words.iter_mut().filter(|word| **word == "20").for_each(|word| *word = "1".into());
+        let program = env!("CARGO_BIN_EXE_lumbre");
+        let output = Command::new(program).args(&words).current_dir(&report).output().unwrap();
+        assert!(output.status.success(), "{words:?}: {}", stderr(&output));
+    };
+    let (mut drawn, mut again, mut different) = (0, 0, BTreeSet::new());
+    for study in &found.studies {
+        for point in &study.points {
+            let name = format!("{}, {}, {}", study.name, point.series, point.label);
+            let kept = read_picture(&report, &point.picture.as_ref().unwrap().picture).unwrap();
+            for words in command_words(&point.command) {
+                let made = match words[1].as_str() {
+                    "render" => {
+                        run(&words);
+                        drawn += 1;
+                        read_picture(&report, "frame").unwrap()
+                    }
+                    "trace" => {
+                        run(&words);
+                        drawn += 1;
+                        read_picture(&report, "picture").unwrap()
+                    }
+                    "cost" => {
+                        let folder = report.join("again");
+                        // One run makes all points of its study.
+                        if again == 0 {
+                            run(&words);
+                        }
+                        again += 1;
+                        let settings = read_report(&folder).unwrap().settings;
+                        assert_eq!(settings, found.settings, "{}", point.command);
+                        read_picture(&folder, &point.picture.as_ref().unwrap().picture).unwrap()
+                    }
+                    other => panic!("{name}: {other}"),
+                };
+                assert!(made == kept, "{name}: {} makes another picture", point.command);
+                let bits = made.radiance.iter().flat_map(|pixel| pixel.to_array()).map(f64::to_bits);
+                different.insert(bits.collect::<Vec<_>>());
+            }
+        }
+    }
+    assert!(drawn > 20 && again > 7, "{drawn} {again}");
+    // Not one picture that is the same whatever is asked for.
+    assert!(different.len() > 20, "{} pictures differ", different.len());
 }
 
 #[test]

@@ -4,11 +4,14 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::Vec3;
-use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors};
-use lumbre_scene::{GlobalTransform, Lightmap, Mesh, StaticObject, hidden_entities};
+use glam::{DVec3, Vec3};
+use lumbre_bake::{
+    Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, has_light_to_bake,
+};
+use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, Mesh, StaticObject, hidden_entities};
 
 use crate::converged::Maps;
+use crate::picture::Picture;
 use crate::scene_file::SceneFile;
 use crate::{Conditions, CostError, ErrorOf};
 
@@ -47,6 +50,22 @@ pub fn bake_arguments(options: &BakeOptions) -> String {
     };
     let patches = options.patch_texels.map_or_else(String::new, |texels| format!(" --patch-texels {texels}"));
     format!("--error {}{density}{patches} --probes never --no-resolution-error --no-reuse", options.error)
+}
+
+/// Why nothing of a scene can be baked, as a sentence; nothing where something can be.
+///
+/// # Errors
+/// [`CostError::Load`].
+pub fn nothing_to_bake(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Option<String>, CostError> {
+    let mut world = scene.open(conditions.aspect())?;
+    let name = &scene.name;
+    Ok(match (static_area(&mut world) > 0.0, has_light_to_bake(&mut world)) {
+        (true, true) => None,
+        (false, _) => Some(format!("Nothing of {name} is static, so that there is nothing to bake.")),
+        (_, false) => Some(format!(
+            "{name} has no light that is baked, no emission and no sky: its lightmaps would be black."
+        )),
+    })
 }
 
 /// Square metres of what is baked.
@@ -119,12 +138,28 @@ pub fn maps_of(world: &mut World) -> Maps {
     named.collect()
 }
 
+/// Columns in which texels are kept.
+const COLUMNS: usize = 256;
+
+/// The texels of all maps one after the other, in their names' order; not a number where one shows no surface.
+pub fn picture_of_maps(maps: &Maps) -> Picture {
+    let of_map = |(image, errors): &(Arc<LightmapImage>, Arc<[f32]>)| {
+        let texels = image.texels.iter().zip(errors.iter());
+        texels
+            .map(|(texel, error)| if error.is_finite() { texel.as_dvec3() } else { DVec3::NAN })
+            .collect::<Vec<_>>()
+    };
+    let mut radiance: Vec<DVec3> = maps.values().flat_map(of_map).collect();
+    radiance.resize(radiance.len().next_multiple_of(COLUMNS), DVec3::NAN);
+    Picture { width: COLUMNS, radiance }
+}
+
 /// By which part the noise that a bake states of itself may be off.
 const NOISE_KNOWN_TO: f64 = 0.2;
 
 /// How far texels are from those of a reference of the same maps: root mean square and largest difference, relative to the reference's mean, over the texels
 /// that show a surface in both. The reference's own noise, as it states it, is known and independent, and is taken off; what is left open is that a
-/// fifth of it is not so well known. Nothing where the maps are not the same.
+/// fifth of it is not so well known. Where the noise explains all of the difference, the error may be anything up to the difference itself. Nothing where the maps are not the same.
 pub fn texel_error(found: &Maps, reference: &Maps) -> Option<ErrorOf> {
     let (mut squares, mut noise, mut sum, mut largest, mut count) = (0.0, 0.0, 0.0, 0.0_f64, 0.0);
     for (name, (wanted, wanted_errors)) in reference {
@@ -151,17 +186,17 @@ pub fn texel_error(found: &Maps, reference: &Maps) -> Option<ErrorOf> {
     let mean = (sum / count).max(f64::MIN_POSITIVE);
     let without = |noise: f64| ((squares - noise).max(0.0) / count).sqrt() / mean;
     let [most, least] = [1.0 - NOISE_KNOWN_TO, 1.0 + NOISE_KNOWN_TO].map(|part| without(noise * part * part));
-    Some(ErrorOf {
-        relative_rmse: without(noise),
-        largest: largest / mean,
-        flip: None,
-        uncertainty: 0.5 * (most - least),
-    })
+    let relative_rmse = without(noise);
+    let uncertainty = match relative_rmse > 0.0 {
+        true => (most - relative_rmse).max(relative_rmse - least),
+        false => without(0.0),
+    };
+    Some(ErrorOf { relative_rmse, largest: largest / mean, flip: None, uncertainty })
 }
 
 #[cfg(test)]
 mod tests {
-    use lumbre_scene::{LightmapEncoding, LightmapImage};
+    use lumbre_scene::LightmapEncoding;
 
     use super::*;
 
@@ -189,6 +224,11 @@ mod tests {
         // A map without error against a noisy reference that knows its noise.
         let none = texel_error(&truth, &noisy(0.05)).expect("the maps are alike");
         assert!(none.relative_rmse < 1e-3 && none.uncertainty > 0.01, "{none:?}");
+        // A reference that states more noise than there is any difference tells only that the error is no larger than that.
+        let unsure = texel_error(&truth, &maps(noisy(0.05)["floor"].0.texels.clone(), 0.2))
+            .expect("the maps are alike");
+        assert_eq!(unsure.relative_rmse, 0.0);
+        assert!((unsure.uncertainty - 0.05).abs() < 1e-3, "{unsure:?}");
         assert_eq!(texel_error(&truth, &maps(vec![Vec3::ONE; 50], 0.0)), None);
     }
 }

@@ -38,6 +38,22 @@ pub enum What {
         /// Its name.
         name: String,
     },
+    /// It is counted for the first time.
+    Counted {
+        /// Its name.
+        name: String,
+    },
+    /// It has no time or no error any more.
+    Lost(Figure),
+    /// It has a time or an error for the first time.
+    Gained(Figure),
+    /// It was measured in another way, so that nothing of it is compared.
+    Method {
+        /// In the first.
+        before: u32,
+        /// In the second.
+        after: u32,
+    },
     /// The error is another one.
     Error {
         /// In the first, as a share.
@@ -54,15 +70,34 @@ pub enum What {
     },
 }
 
+/// What a point may have or not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Figure {
+    /// A time.
+    Time,
+    /// An error.
+    Error,
+}
+
+impl Figure {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Error => "error",
+        }
+    }
+}
+
 /// Errors below this differ by rounding: a factor between them means nothing.
 const NEGLIGIBLE_ERROR: f64 = 1e-5;
 
 impl Change {
-    /// Whether the second report is the worse one by it: something is gone, a count or an error grew. Times are no failure by themselves.
+    /// Whether the second report is the worse one by it: a point, a count or an error is gone, or a count or an error grew. Times are no failure by themselves.
     pub fn is_worse(&self) -> bool {
         match &self.what {
-            What::Gone | What::Uncounted { .. } => true,
-            What::New | What::Time { .. } => false,
+            What::Gone | What::Uncounted { .. } | What::Lost(Figure::Error) => true,
+            What::New | What::Counted { .. } | What::Time { .. } | What::Lost(Figure::Time) => false,
+            What::Gained(_) | What::Method { .. } => false,
             What::Count { before, after, .. } | What::Error { before, after } => after > before,
         }
     }
@@ -87,6 +122,16 @@ impl fmt::Display for Change {
             What::Gone => write!(f, ": is not there any more"),
             What::New => write!(f, ": is new"),
             What::Uncounted { name } => write!(f, ": {name} is not counted any more"),
+            What::Counted { name } => write!(f, ": {name} is counted for the first time"),
+            What::Lost(figure) => write!(f, ": has no {} any more", figure.name()),
+            What::Gained(figure) => write!(
+                f,
+                ": has {} for the first time",
+                if *figure == Figure::Time { "a time" } else { "an error" }
+            ),
+            What::Method { before, after } => {
+                write!(f, ": was measured by method {after} instead of {before}, and is not compared")
+            }
             What::Count { name, before, after } => {
                 let factor = times(*before, *after);
                 write!(f, ": {name} {} instead of {}{factor}", rounded(*after), rounded(*before))
@@ -112,6 +157,10 @@ pub fn compare_reports(before: &CostReport, after: &CostReport, factor: f64) -> 
             changes.push(whole(&study.name, What::Gone));
             continue;
         };
+        if study.method != other.method {
+            changes.push(whole(&study.name, What::Method { before: study.method, after: other.method }));
+            continue;
+        }
         let mut note = |point: &Point, what| {
             let point = format!("{}, {}", point.series, point.label);
             changes.push(Change { study: study.name.clone(), point, what });
@@ -150,6 +199,18 @@ fn differences(before: &Point, after: &Point, factor: f64) -> Vec<What> {
             }
             Some(_) => {}
             None => found.push(What::Uncounted { name: name.clone() }),
+        }
+    }
+    let is_new = |name: &&String| !before.counts.contains_key(*name);
+    found.extend(after.counts.keys().filter(is_new).map(|name| What::Counted { name: name.clone() }));
+    for (figure, was, is) in [
+        (Figure::Time, before.milliseconds.is_some(), after.milliseconds.is_some()),
+        (Figure::Error, before.error.is_some(), after.error.is_some()),
+    ] {
+        match (was, is) {
+            (true, false) => found.push(What::Lost(figure)),
+            (false, true) => found.push(What::Gained(figure)),
+            _ => {}
         }
     }
     if let (Some(was), Some(is)) = (before.error, after.error) {

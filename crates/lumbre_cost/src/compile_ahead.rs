@@ -41,9 +41,16 @@ pub fn device_ahead(gpu: &Gpu) -> Option<Gpu> {
     gpu.another().inspect_err(|error| tracing::debug!("nothing is compiled ahead: {error}")).ok()
 }
 
-/// Draws what nobody has begun of the frames, from the last to the first, until `end` is set.
-pub fn compile_ahead(gpu: &Gpu, size: (u32, u32), frames: &[Frame], begun: &Begun, end: &AtomicBool) {
-    if let Err(error) = draw(gpu, size, frames, begun, end) {
+/// Makes those drawings of the frames that nobody has begun, from the last frame to the first, until `end` is set.
+pub fn compile_ahead(
+    gpu: &Gpu,
+    size: (u32, u32),
+    frames: &[Frame],
+    drawings: &[Drawing],
+    begun: &Begun,
+    end: &AtomicBool,
+) {
+    if let Err(error) = draw(gpu, size, frames, drawings, begun, end) {
         // Whoever draws the frame for its own sake meets it, too, and says so.
         tracing::debug!("nothing more is compiled ahead: {error}");
     }
@@ -53,6 +60,7 @@ fn draw(
     gpu: &Gpu,
     (width, height): (u32, u32),
     frames: &[Frame],
+    drawings: &[Drawing],
     begun: &Begun,
     end: &AtomicBool,
 ) -> Result<(), RenderError> {
@@ -60,7 +68,7 @@ fn draw(
     let picture = Offscreen::new(gpu, width, height, OffscreenFormat::LinearFloat)?;
     let timed = Offscreen::new(gpu, width, height, OffscreenFormat::Rgba8)?;
     for (number, frame) in frames.iter().enumerate().rev() {
-        for drawing in [Drawing::Picture, Drawing::Timed] {
+        for &drawing in drawings {
             if end.load(Ordering::Relaxed) {
                 return Ok(());
             }
@@ -100,13 +108,14 @@ mod tests {
                 [(0, Drawing::Picture), (0, Drawing::Timed), (1, Drawing::Picture), (1, Drawing::Timed)];
             drawings.into_iter().filter(|(frame, drawing)| begun.begin(*frame, *drawing)).count()
         };
-        let draw = |end: bool| {
+        let draw = |drawings: &[Drawing], end: bool| {
             let begun = Begun::none_of(2);
             begun.begin(0, Drawing::Timed);
-            draw(&gpu, (32, 18), &frames, &begun, &AtomicBool::new(end)).unwrap();
+            draw(&gpu, (32, 18), &frames, drawings, &begun, &AtomicBool::new(end)).unwrap();
             what_is_left(&begun)
         };
-        assert_eq!((draw(false), draw(true)), (0, 3));
+        let both = [Drawing::Picture, Drawing::Timed];
+        assert_eq!((draw(&both, false), draw(&both, true), draw(&both[..1], false)), (0, 3, 1));
     }
 
     #[test]

@@ -7,9 +7,14 @@ use std::time::Duration;
 
 use lumbre_render::{Gpu, Renderer};
 
-use crate::CostError;
+use crate::command_line::quoted;
 use crate::converged::ConvergedBakes;
 use crate::rounds::Rounds;
+
+use crate::{CostError, Spread};
+
+/// By which factor the frames of a quick report have less time than those of a full one.
+const QUICK: f64 = 14.0;
 
 /// Who is told how much of a study is done, 0 to 1, or nothing new, and says whether to go on. Called from any thread.
 pub type Listener<'a> = dyn Fn(Option<f64>) -> ControlFlow<()> + Sync + 'a;
@@ -29,14 +34,19 @@ pub struct Conditions<'a> {
     pub quick: bool,
     /// Nothing is timed and nothing compared: whatever serves only that is done once, or cut short.
     pub counts_only: bool,
-    /// Width and height of the pictures in pixels.
+    /// Width and height of the study's pictures in pixels.
     pub size: (u32, u32),
+    /// Width and height that the report was asked for: a study may draw smaller pictures.
+    pub size_of_report: (u32, u32),
     /// Of everything that draws random numbers.
     pub seed: u32,
     /// The folder of the report: scenes that a study makes are written below it.
     pub folder: &'a Path,
     /// Scenes that were given; without any a study makes its own.
     pub files: &'a [PathBuf],
+    /// Frames are timed as a window shows them, with a tone curve, in eight bits. Otherwise as their pictures are drawn, in linear light and floats: then a picture and its time come from the same
+    /// pipelines, which a software rasterizer takes longer to compile than to draw with a few times.
+    pub as_shown: bool,
     /// Who is told.
     pub listener: &'a Listener<'a>,
 }
@@ -58,18 +68,48 @@ impl Conditions<'_> {
         }
     }
 
-    /// Rounds for about so many seconds, a twelfth of them if it has to be quick; none for counts alone.
+    /// Rounds for about so many seconds, a small part of them if it has to be quick; none for counts alone.
     pub fn rounds(&self, seconds: f64) -> Rounds {
         match self.quick {
             _ if self.counts_only => Rounds { warm_up: 0, fewest: 0, most: 0, time: Duration::ZERO },
-            true => Rounds { warm_up: 1, fewest: 3, most: 15, time: Duration::from_secs_f64(seconds / 12.0) },
+            true => {
+                Rounds { warm_up: 1, fewest: 5, most: 15, time: Duration::from_secs_f64(seconds / QUICK) }
+            }
             false => Rounds { warm_up: 1, fewest: 5, most: 51, time: Duration::from_secs_f64(seconds) },
         }
     }
 
-    /// How often work is done that takes too long for rounds by time: once for counts alone.
-    pub fn repetitions(&self, usual: usize) -> usize {
-        if self.counts_only { 1 } else { usual }
+    /// How often work is done that takes too long for rounds by time: as often as its times have to be repeated to be told apart, and once for counts alone.
+    pub fn repetitions(&self) -> usize {
+        if self.counts_only { 1 } else { Spread::FEWEST_ROUNDS_THAT_TELL }
+    }
+
+    /// The command that draws a file's frame as a study draws it, for its picture and for its time. `arguments` are what is asked for besides, each with a space before it.
+    pub fn drawing(&self, file: &str, arguments: &str) -> String {
+        let asked = format!("{arguments} --size {}", self.size_text());
+        let timed = "--frames 20 --timings times.json";
+        match self.as_shown {
+            true => format!(
+                "lumbre render {file} -o frame.exr{asked} && lumbre render {file} -o frame.png{asked} {timed}"
+            ),
+            false => format!("lumbre render {file} -o frame.exr{asked} {timed}"),
+        }
+    }
+
+    /// The command that runs a study again as it was run for this report, in the folder of the report.
+    pub fn again(&self, study: &str) -> String {
+        let files = self.files.iter().map(|path| {
+            let whole = path.canonicalize();
+            format!(" {}", quoted(&whole.as_deref().unwrap_or(path).to_string_lossy()))
+        });
+        let quick = if self.quick { " --quick" } else { "" };
+        let counts = if self.counts_only { " --counts-only" } else { "" };
+        format!(
+            "lumbre cost{} -o again --study {study}{quick}{counts} --size {} --seed {}",
+            files.collect::<String>(),
+            Self::text_of(self.size_of_report),
+            self.seed
+        )
     }
 
     /// How long a bake may take that others are compared with, in seconds of a full and of a quick report. For counts alone, which are not compared with it, hardly any time.
@@ -85,6 +125,10 @@ impl Conditions<'_> {
 
     /// The pictures' size as the command line has it.
     pub fn size_text(&self) -> String {
-        format!("{}x{}", self.size.0, self.size.1)
+        Self::text_of(self.size)
+    }
+
+    fn text_of((width, height): (u32, u32)) -> String {
+        format!("{width}x{height}")
     }
 }

@@ -32,7 +32,14 @@ pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
             let finest = smallest(points, &only.series).unwrap_or(only);
             format!("{range} the cheapest is {} ({}: {}).", only.series, finest.label, cost_of(finest))
         }
-        several => format!("{range} the times do not decide between {}.", names_of(several)),
+        several => {
+            let what = if found[..fine].iter().any(|stretch| stretch.by_error) {
+                "times and errors"
+            } else {
+                "times"
+            };
+            format!("{range} the {what} do not decide between {}.", names_of(several))
+        }
     });
     // From the largest error downwards: as long as one series is among the cheapest.
     if fine < found.len() {
@@ -119,19 +126,47 @@ pub fn error_of(error: &ErrorOf) -> String {
     }
 }
 
-/// How much longer the first takes than the second, as a factor with its range, from times of the same rounds; nothing without any.
+/// How much longer the first takes than the second, as a factor with the interval of its median, from times of the same rounds; nothing without any.
 pub fn ratio_of(first: &[f64], second: &[f64]) -> Option<Spread> {
     let ratios: Vec<f64> = first.iter().zip(second).map(|(a, b)| a / b.max(1e-9)).collect();
-    Spread::of(&ratios)
+    Spread::of_median(&ratios)
 }
 
-/// Whether a factor is told apart from 1: `Some(true)` above, `Some(false)` below, nothing where the quartiles hold 1.
+/// Whether a factor is told apart from 1: `Some(true)` above, `Some(false)` below, nothing where its interval holds 1 or there are too few rounds.
 pub fn is_above_one(ratio: &Spread) -> Option<bool> {
-    match (ratio.rounds > 1, ratio.lower > 1.0, ratio.upper < 1.0) {
+    match (ratio.rounds >= Spread::FEWEST_PAIRS_THAT_TELL, ratio.lower > 1.0, ratio.upper < 1.0) {
         (true, true, _) => Some(true),
         (true, _, true) => Some(false),
         _ => None,
     }
+}
+
+/// A factor between times with its interval; where it is not told apart from 1, that, and by how many rounds.
+pub fn factor(ratio: &Spread) -> String {
+    let [median, lower, upper] = [ratio.median, ratio.lower, ratio.upper].map(rounded);
+    let open = match is_above_one(ratio) {
+        Some(_) => String::new(),
+        None => format!(", not distinguishable from 1 in {}", rounds(ratio.rounds)),
+    };
+    format!("{median} ({lower} to {upper}{open})")
+}
+
+/// How many times the second time the first one is, by their medians and ranges; where the ranges do not lie apart, that, and by how many rounds.
+pub fn times_of(first: &Spread, second: &Spread) -> String {
+    let [median, lower, upper] =
+        [first.median / second.median, first.lower / second.upper, first.upper / second.lower].map(rounded);
+    match first.is_below(second) || second.is_below(first) {
+        true => format!("{median} times the time ({lower} to {upper})"),
+        false => format!(
+            "a time that is not distinguishable in {} ({lower} to {upper} of it)",
+            rounds(first.rounds.min(second.rounds))
+        ),
+    }
+}
+
+/// "1 round", "2 rounds".
+pub fn rounds(count: usize) -> String {
+    format!("{count} {}", if count == 1 { "round" } else { "rounds" })
 }
 
 /// A number with about three digits.
@@ -166,7 +201,7 @@ pub fn percent(share: f64) -> String {
     format!("{} %", rounded(100.0 * share))
 }
 
-/// A time with half of its quartiles' range.
+/// A time with half of its range.
 pub fn milliseconds(time: &Spread) -> String {
     match time.rounds {
         1 => format!("{} ms", rounded(time.median)),
@@ -203,11 +238,24 @@ mod tests {
     }
 
     #[test]
-    fn a_factor_is_told_from_one_by_its_quartiles() {
+    fn a_factor_is_told_from_one_by_its_interval() {
         let ratio = |first: &[f64], second: &[f64]| ratio_of(first, second).as_ref().and_then(is_above_one);
-        assert_eq!(ratio(&[2.0, 2.1, 2.2], &[1.0, 1.0, 1.0]), Some(true));
-        assert_eq!(ratio(&[1.0, 1.0, 1.0], &[2.0, 2.1, 2.2]), Some(false));
-        assert_eq!(ratio(&[0.9, 1.0, 1.1], &[1.0, 1.0, 1.0]), None);
-        assert_eq!(ratio(&[2.0], &[1.0]), None);
+        assert_eq!(ratio(&[2.0, 2.1, 2.2, 2.1, 2.0], &[1.0; 5]), Some(true));
+        assert_eq!(ratio(&[1.0; 5], &[2.0, 2.1, 2.2, 2.1, 2.0]), Some(false));
+        assert_eq!(ratio(&[0.9, 1.1, 1.1, 1.2, 1.1], &[1.0; 5]), None);
+        assert_eq!(ratio(&[2.0; 4], &[1.0; 4]), None, "four pairs prove little");
+        let nothing = ratio_of(&[0.9, 1.1, 1.2, 1.0, 1.0], &[1.0; 5]).map(|ratio| factor(&ratio));
+        assert_eq!(nothing.as_deref(), Some("1.00 (0.900 to 1.20, not distinguishable from 1 in 5 rounds)"));
+    }
+
+    #[test]
+    fn times_are_compared_only_where_they_lie_apart() {
+        let spread = |lower, median, upper, rounds| Spread { lower, median, upper, rounds };
+        let short = spread(0.9, 1.0, 1.1, 3);
+        assert_eq!(times_of(&spread(1.8, 2.0, 2.2, 3), &short), "2.00 times the time (1.64 to 2.44)");
+        let open = "a time that is not distinguishable in 3 rounds (0.909 to 2.44 of it)";
+        assert_eq!(times_of(&spread(1.0, 2.0, 2.2, 3), &short), open);
+        let once = times_of(&spread(9.0, 9.0, 9.0, 1), &short);
+        assert!(once.starts_with("a time that is not distinguishable in 1 round "), "{once}");
     }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use image::codecs::jpeg::JpegEncoder;
 use image::{Rgb32FImage, RgbImage};
 use lumbre_trace::heat_color;
 use rayon::prelude::*;
@@ -21,6 +22,11 @@ pub const REPORT: &str = "cost.json";
 pub const TABLE: &str = "cost.csv";
 /// The page.
 pub const PAGE: &str = "index.html";
+
+/// The extension of the pictures that the page holds: a tenth of the bytes of the PNG files beside them.
+const IN_PAGE: &str = "page.jpg";
+/// Their quality, of 100: what it loses is less than the errors that are to be seen.
+const QUALITY: u8 = 88;
 
 /// A report's folder.
 #[derive(Clone, Debug)]
@@ -102,7 +108,7 @@ impl Folder {
         let table =
             write_table(report).map_err(|source| CostError::Table { path: self.path.join(TABLE), source })?;
         self.replace(TABLE, &table)?;
-        let images = |name: &str| fs::read(self.path.join(format!("{name}.png"))).ok();
+        let images = |name: &str| fs::read(self.path.join(format!("{name}.{IN_PAGE}"))).ok();
         self.replace(PAGE, page(report, &images as &Images<'_>)?.as_bytes())
     }
 
@@ -126,7 +132,12 @@ impl Folder {
         let height = bytes.len() / (3 * width.max(1));
         let image = RgbImage::from_raw(width as u32, height as u32, bytes);
         let image = image.ok_or_else(|| CostError::Sizes { point: name.to_owned() })?;
-        image.save(&path).map_err(|source| CostError::Picture { path, source })
+        image.save(&path).map_err(|source| CostError::Picture { path, source })?;
+        let path = self.path.join(format!("{name}.{IN_PAGE}"));
+        let mut bytes = Vec::new();
+        let encoded = image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, QUALITY));
+        encoded.map_err(|source| CostError::Picture { path: path.clone(), source })?;
+        fs::write(&path, bytes).map_err(|source| CostError::File { path, source })
     }
 
     fn replace(&self, name: &str, bytes: &[u8]) -> Result<(), CostError> {
@@ -165,12 +176,8 @@ pub fn read_picture(folder: &Path, name: &str) -> Result<Picture, CostError> {
 /// Whether the pictures of a point are there.
 pub fn has_pictures(folder: &Path, point: &Point) -> bool {
     let Some(files) = &point.picture else { return true };
-    let names = [
-        format!("{}.exr", files.picture),
-        format!("{}.png", files.picture),
-        format!("{}.heat.png", files.picture),
-        format!("{}.exr", files.reference),
-        format!("{}.png", files.reference),
-    ];
-    names.iter().all(|name| folder.join(name).exists())
+    let (picture, heat, reference) = (&files.picture, &format!("{}.heat", files.picture), &files.reference);
+    let light = [picture, reference].map(|name| format!("{name}.exr"));
+    let shown = [picture, heat, reference].map(|name| [format!("{name}.png"), format!("{name}.{IN_PAGE}")]);
+    light.iter().chain(shown.iter().flatten()).all(|name| folder.join(name).exists())
 }

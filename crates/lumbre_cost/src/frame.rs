@@ -16,6 +16,8 @@ pub struct Frame {
     pub renderer: Option<&'static str>,
     /// Before each frame that is timed every lamp that casts shadows moves by a hair and back again: no shadow map is as it was.
     pub moving_lamps: bool,
+    /// The lights that it evaluates are counted, by shader variants that are compiled for nothing else.
+    pub counts_lights: bool,
 }
 
 impl Frame {
@@ -26,7 +28,7 @@ impl Frame {
 
     /// The same of a scene that other frames show, too.
     pub fn of(world: &Arc<Mutex<World>>, options: FrameOptions) -> Self {
-        Self { world: Arc::clone(world), options, renderer: None, moving_lamps: false }
+        Self { world: Arc::clone(world), options, renderer: None, moving_lamps: false, counts_lights: false }
     }
 
     /// Its scene, for whoever draws it next.
@@ -38,6 +40,11 @@ impl Frame {
     /// The same with a renderer in common with all that name it so.
     pub fn sharing(self, renderer: &'static str) -> Self {
         Self { renderer: Some(renderer), ..self }
+    }
+
+    /// The same with its light evaluations counted, or not.
+    pub fn counting_lights(self, counts_lights: bool) -> Self {
+        Self { counts_lights, ..self }
     }
 
     /// The same with lamps that move.

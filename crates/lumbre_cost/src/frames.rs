@@ -1,7 +1,8 @@
 //! Frames that are drawn again and again, side by side: their times, their counts, and the picture that each makes. Not the scenes.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -30,6 +31,8 @@ pub struct DrawnFrame {
     /// Vertices and fragments that were shaded. How often a device shades a vertex that several triangles share, and whether it counts fragments that another one hides, is
     /// its own affair: nothing where only that is counted which is the same everywhere.
     pub invocations: Option<[u64; 2]>,
+    /// Lights that were evaluated at a vertex or fragment, and of these evaluations the ones that contributed something to be seen, where that was asked for and the device can count it.
+    pub light_evaluations: Option<[u64; 2]>,
     /// What the renderer says of it.
     pub statistics: Statistics,
 }
@@ -45,12 +48,16 @@ impl DrawnFrame {
         let of_device = self.invocations.map(|[vertices, fragments]| {
             [("vertex invocations", vertices as f64), ("fragment invocations", fragments as f64)]
         });
+        let of_lights = self.light_evaluations.map(|[tested, contributing]| {
+            [("light evaluations", tested as f64), ("light evaluations above 1/255", contributing as f64)]
+        });
+        let of_device = of_device.into_iter().chain(of_lights);
         let counts = [
             ("triangles", self.statistics.triangles as f64),
             ("draw calls", self.statistics.draws as f64),
             ("bytes uploaded", self.statistics.uploads.total() as f64),
         ];
-        of_device.into_iter().flatten().chain(counts).map(|(name, count)| (name.to_owned(), count)).collect()
+        of_device.flatten().chain(counts).map(|(name, count)| (name.to_owned(), count)).collect()
     }
 }
 
@@ -65,30 +72,48 @@ pub fn draw_frames(
     seconds: f64,
     [before, after]: [f64; 2],
 ) -> Result<Vec<DrawnFrame>, CostError> {
-    let shared = shared_renderers(conditions, &frames);
+    let renderers = renderers(conditions, &frames);
     let (width, height) = conditions.size;
-    let target = Offscreen::new(conditions.gpu, width, height, OffscreenFormat::Rgba8)?;
-    let target = target.target();
-    let mut work: Vec<Work<'_>> =
-        frames.iter().map(|frame| timed_work(conditions, frame, &shared, &target)).collect();
+    let format = if conditions.as_shown { OffscreenFormat::Rgba8 } else { OffscreenFormat::LinearFloat };
+    let target = Offscreen::new(conditions.gpu, width, height, format)?;
+    let timed_target = target.target();
     let part = |share: f64| before + share * (after - before);
+    let rounds = conditions.rounds(seconds);
+    let timed = |frame| timed_work(conditions, frame, &renderers, &timed_target);
+    let mut work: Vec<Work<'_>> =
+        frames.iter().zip(0..).map(|(frame, number)| timed((frame, number))).collect();
     let mut drawn = while_compiling_ahead(conditions, &frames, |begun| {
         let mut drawn = Vec::new();
         for (number, frame) in frames.iter().enumerate() {
             conditions.tell(part(0.3 * number as f64 / frames.len() as f64))?;
             begun.begin(number, Drawing::Picture);
-            drawn.push(picture_of(conditions, &mut frame.world(), &frame.options)?);
+            let mut world = frame.world();
+            let mut found = match conditions.as_shown {
+                true => {
+                    picture_of(conditions, &mut conditions.pictures.borrow_mut(), &mut world, &frame.options)?
+                }
+                false => {
+                    picture_of(conditions, &mut renderers[number].borrow_mut(), &mut world, &frame.options)?
+                }
+            };
+            if frame.counts_lights && !conditions.counts_only {
+                // With a renderer of its own: what it compiles for this is for nothing else.
+                let mut counting = conditions.pictures.borrow_mut();
+                found.light_evaluations = lights_of(conditions, &mut counting, &mut world, &frame.options)?;
+            }
+            drawn.push(found);
         }
-        let next = Cell::new(0);
-        warm_up(&mut work, conditions.rounds(seconds), &|| {
-            begun.begin(next.get() % frames.len(), Drawing::Timed);
-            next.set(next.get() + 1);
-            conditions.tell(part(0.3))
-        })?;
+        // What was drawn for its picture is warm, unless other pipelines are timed.
+        let cold = work.iter_mut().zip(&frames).enumerate();
+        let cold = cold.filter(|(_, (_, frame))| conditions.as_shown || frame.renderer.is_none());
+        for (number, (piece, _)) in cold {
+            begun.begin(number, Drawing::Timed);
+            warm_up([piece], rounds, &|| conditions.tell(part(0.3)))?;
+        }
         Ok(drawn)
     })?;
     let go_on = |share: f64| conditions.tell(part(0.3 + 0.7 * share));
-    let times = in_rounds(&mut work, conditions.rounds(seconds), &go_on)?;
+    let times = in_rounds(&mut work, rounds, &go_on)?;
     for (drawn, times) in drawn.iter_mut().zip(times) {
         drawn.times = times;
     }
@@ -115,7 +140,12 @@ fn while_compiling_ahead<T>(
     std::thread::scope(|scope| {
         let ahead = conditions.ahead.filter(|_| frames.len() > 1).map(|gpu| {
             let (begun, end) = (&begun, &end);
-            scope.spawn(move || compile_ahead(gpu, size, frames, begun, end))
+            let drawings: &[Drawing] = match conditions.as_shown {
+                true => &[Drawing::Picture, Drawing::Timed],
+                // The same pipelines.
+                false => &[Drawing::Picture],
+            };
+            scope.spawn(move || compile_ahead(gpu, size, frames, drawings, begun, end))
         });
         let ending = EndsWhenDropped(&end);
         let drawn = draw(&begun);
@@ -128,42 +158,45 @@ fn while_compiling_ahead<T>(
     })
 }
 
-/// The renderers that frames name, one for each name.
-fn shared_renderers(
-    conditions: &Conditions<'_>,
-    frames: &[Frame],
-) -> BTreeMap<&'static str, RefCell<Renderer>> {
-    let names = frames.iter().filter_map(|frame| frame.renderer);
-    names.map(|name| (name, RefCell::new(Renderer::new(conditions.gpu)))).collect()
+/// The renderer of each frame, one for all that name the same.
+fn renderers(conditions: &Conditions<'_>, frames: &[Frame]) -> Vec<Rc<RefCell<Renderer>>> {
+    let mut shared: BTreeMap<&'static str, Rc<RefCell<Renderer>>> = BTreeMap::new();
+    let new = || Rc::new(RefCell::new(Renderer::new(conditions.gpu)));
+    let of = |frame: &Frame| {
+        frame.renderer.map_or_else(new, |name| Rc::clone(shared.entry(name).or_insert_with(new)))
+    };
+    frames.iter().map(of).collect()
 }
 
 /// What is timed of a frame.
 fn timed_work<'a>(
     conditions: &Conditions<'_>,
-    frame: &'a Frame,
-    shared: &'a BTreeMap<&'static str, RefCell<Renderer>>,
+    (frame, number): (&'a Frame, usize),
+    renderers: &'a [Rc<RefCell<Renderer>>],
     target: &'a FrameTarget,
 ) -> Work<'a> {
     let mut side = HAIR;
-    let mut draw = move |renderer: &mut Renderer| -> Result<f64, CostError> {
-        let mut world = frame.world();
-        if frame.moving_lamps {
-            move_lamps(&mut world, side);
-            side = -side;
-        }
-        timed_frame(renderer, &mut world, target, &frame.options)
+    let options = match conditions.as_shown {
+        true => frame.options.clone(),
+        false => picture_options(&frame.options),
     };
-    match frame.renderer.and_then(|name| shared.get(name)) {
-        Some(renderer) => Box::new(move || {
-            let mut renderer = renderer.borrow_mut();
-            draw(&mut renderer)?;
-            draw(&mut renderer)
-        }),
-        None => {
-            let mut renderer = Renderer::new(conditions.gpu);
-            Box::new(move || draw(&mut renderer))
+    // Another frame's World was the last one that a shared renderer has read.
+    let is_shared = frame.renderer.is_some();
+    Box::new(move || {
+        let mut renderer = renderers[number].borrow_mut();
+        let mut world = frame.world();
+        let mut draw = || -> Result<f64, CostError> {
+            if frame.moving_lamps {
+                move_lamps(&mut world, side);
+                side = -side;
+            }
+            timed_frame(&mut renderer, &mut world, target, &options)
+        };
+        if is_shared {
+            draw()?;
         }
-    }
+        draw()
+    })
 }
 
 /// Milliseconds of a frame, from the call until the device has finished.
@@ -190,6 +223,7 @@ fn move_lamps(world: &mut World, by: f64) {
 
 fn picture_of(
     conditions: &Conditions<'_>,
+    renderer: &mut Renderer,
     world: &mut World,
     options: &FrameOptions,
 ) -> Result<DrawnFrame, CostError> {
@@ -197,7 +231,6 @@ fn picture_of(
     let target = Offscreen::new(conditions.gpu, width, height, OffscreenFormat::LinearFloat)?;
     let measure = if conditions.counts_only { Measure::Nothing } else { Measure::TimeAndInvocations };
     let options = FrameOptions { measure, ..picture_options(options) };
-    let mut renderer = conditions.pictures.borrow_mut();
     let report = renderer.render(world, &target.target(), &options)?;
     let measured = renderer.wait()?.cloned().unwrap_or_default();
     let invocations = measured.passes.iter().filter_map(|pass| pass.invocations);
@@ -211,8 +244,29 @@ fn picture_of(
             radiance: radiance.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(),
         },
         invocations: (!conditions.counts_only).then_some(sum),
+        light_evaluations: None,
         statistics: report.statistics,
     })
+}
+
+/// How many lights a frame evaluates, and how many of these evaluations contribute, by the shader variants that count them; nothing where the device cannot.
+fn lights_of(
+    conditions: &Conditions<'_>,
+    renderer: &mut Renderer,
+    world: &mut World,
+    options: &FrameOptions,
+) -> Result<Option<[u64; 2]>, CostError> {
+    let (width, height) = conditions.size;
+    let target = Offscreen::new(conditions.gpu, width, height, OffscreenFormat::LinearFloat)?;
+    let options = FrameOptions { measure: Measure::Lights, ..picture_options(options) };
+    renderer.render(world, &target.target(), &options)?;
+    renderer.wait()?;
+    let counts =
+        renderer.accounting().into_iter().flat_map(|account| &account.passes).filter_map(|pass| pass.lights);
+    Ok(counts.fold(None, |sum, found| {
+        let [tested, contributing] = sum.unwrap_or([0, 0]);
+        Some([tested + found.tested, contributing + found.contributing])
+    }))
 }
 
 /// A frame for its picture alone.
@@ -224,7 +278,7 @@ pub fn draw_picture(
     world: &mut World,
     options: &FrameOptions,
 ) -> Result<Picture, CostError> {
-    Ok(picture_of(conditions, world, options)?.picture)
+    Ok(picture_of(conditions, &mut conditions.pictures.borrow_mut(), world, options)?.picture)
 }
 
 #[cfg(test)]
@@ -243,7 +297,7 @@ mod tests {
     fn what_is_compiled_ahead_changes_no_picture_and_no_count() -> Result<(), CostError> {
         let (gpu, folder) = (Gpu::headless()?, std::env::temp_dir());
         let other = gpu.another()?;
-        let drawn = |ahead| -> Result<Vec<DrawnFrame>, CostError> {
+        let drawn = |ahead, as_shown| -> Result<Vec<DrawnFrame>, CostError> {
             let (pictures, converged) = (RefCell::new(Renderer::new(&gpu)), ConvergedBakes::default());
             let conditions = Conditions {
                 gpu: &gpu,
@@ -253,6 +307,8 @@ mod tests {
                 quick: true,
                 counts_only: false,
                 size: (64, 36),
+                size_of_report: (64, 36),
+                as_shown,
                 seed: 0,
                 folder: &folder,
                 files: &[],
@@ -267,10 +323,12 @@ mod tests {
             ];
             draw_frames(&conditions, frames, 0.0, [0.0, 1.0])
         };
-        for (alone, together) in drawn(None)?.iter().zip(drawn(Some(&other))?) {
-            assert!(alone.picture.radiance == together.picture.radiance);
-            assert_eq!(alone.counts(), together.counts());
-            assert_eq!(together.times.len(), 3);
+        for as_shown in [false, true] {
+            for (alone, together) in drawn(None, as_shown)?.iter().zip(drawn(Some(&other), as_shown)?) {
+                assert!(alone.picture.radiance == together.picture.radiance);
+                assert_eq!(alone.counts(), together.counts());
+                assert_eq!(together.times.len(), 5);
+            }
         }
         Ok(())
     }

@@ -28,6 +28,7 @@
 
 mod baked;
 mod clustered_mesh;
+mod command_line;
 mod comparison;
 mod compile_ahead;
 mod conditions;
@@ -58,7 +59,8 @@ mod table;
 mod traced;
 mod tune;
 
-pub use comparison::{Change, What, compare_reports};
+pub use command_line::command_words;
+pub use comparison::{Change, Figure, What, compare_reports};
 pub use conditions::{Conditions, Listener};
 pub use error::CostError;
 pub use findings::cheapest_by_error;
@@ -68,7 +70,7 @@ pub use live::{Beside, BesideReference, LightCost, LightCosts, Priced, SideView,
 pub use page::{Images, page};
 pub use picture::{Compared, Picture, compared};
 pub use report::{
-    CostReport, ErrorOf, ErrorOver, Machine, Plot, Point, PointPicture, Quantity, Settings, Study,
+    CostReport, ErrorOf, ErrorOver, KeptMaps, Machine, Plot, Point, PointPicture, Quantity, Settings, Study,
 };
 pub use run::{CostOptions, CostProgress, measure};
 pub use spread::Spread;

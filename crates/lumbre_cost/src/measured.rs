@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::picture::{Compared, Picture, compared};
-use crate::{CostError, ErrorOf, ErrorOver, Point, PointPicture, Study};
+use crate::{CostError, ErrorOf, ErrorOver, KeptMaps, Point, PointPicture, Study};
 
 /// A study that is finished.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +38,8 @@ impl Measured {
     ) -> Result<(), CostError> {
         let found = self.compared(&point, &picture, reference, error_of)?;
         let name = self.file_name(&format!("{} {}", point.series, point.label));
-        let files = PointPicture { picture: name.clone(), reference: reference.to_owned(), error_of };
+        let maps = point.picture.as_ref().and_then(|files| files.maps.clone());
+        let files = PointPicture { picture: name.clone(), reference: reference.to_owned(), error_of, maps };
         let error = match (error_of, point.error) {
             (ErrorOver::Beyond, Some(own)) => ErrorOf { flip: found.error.flip, ..own },
             (_, own) => ErrorOf { uncertainty: own.map_or(0.0, |own| own.uncertainty), ..found.error },
@@ -49,19 +50,21 @@ impl Measured {
         Ok(())
     }
 
-    /// Adds a point with the error of a picture against its reference, neither of which is kept.
+    /// Adds a point whose error is of lightmaps, with a frame that shows them. Both pairs are kept.
     ///
     /// # Errors
     /// [`CostError::Sizes`], [`CostError::NotFinite`].
-    pub fn add_error(
+    pub fn add_maps(
         &mut self,
         point: Point,
-        picture: &Picture,
-        reference: &Picture,
+        (frame, reference): (Picture, &str),
+        (maps, maps_of_reference): (Picture, &str),
     ) -> Result<(), CostError> {
-        let error = checked(&self.study, &point, compared(reference, picture, ErrorOver::Picture))?.error;
-        self.study.points.push(Point { error: Some(error), ..point });
-        Ok(())
+        let name = self.file_name(&format!("{} {} maps", point.series, point.label));
+        self.pictures.insert(name.clone(), maps);
+        let kept = KeptMaps { picture: name, reference: maps_of_reference.to_owned() };
+        let files = PointPicture { maps: Some(kept), ..PointPicture::default() };
+        self.add_picture(Point { picture: Some(files), ..point }, frame, reference, ErrorOver::Beyond)
     }
 
     fn compared(

@@ -1,10 +1,12 @@
 //! A study's numbers over a pair of axes, both logarithmic, as SVG that takes its colours from the page around it. Not the page.
 
+use maud::{Markup, html};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::fronts::pareto_front;
+use crate::findings::{cost_of, counted, rounded};
+use crate::fronts::front_of;
 use crate::{CostError, Plot, Point, Quantity, Study};
 
 /// How large a plot is drawn, in pixels: text keeps its size, so that phones get drawings of their own.
@@ -40,22 +42,60 @@ const FONT: u32 = 13;
 /// Radius of a mark.
 const MARK: i32 = 4;
 
-/// Draws it.
+/// Where a point's mark stands in a drawing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Mark {
+    /// The point's place in its study.
+    point: usize,
+    /// In pixels of the drawing.
+    at: (i32, i32),
+}
+
+/// Radius of what answers to a pointer or a finger around a mark, in pixels of the drawing.
+const REACH: i32 = 11;
+
+/// Draws it. Around every mark lies an invisible one that answers to pointers, fingers and the keyboard, and says which point it is.
 ///
 /// # Errors
 /// [`CostError::Plot`].
 pub fn draw_plot(study: &Study, plot: &Plot, size: PlotSize) -> Result<String, CostError> {
     let mut svg = String::new();
-    {
+    let marks = {
         let root = SVGBackend::with_string(&mut svg, size.pixels()).into_drawing_area();
-        draw(&root, study, plot, size)
-            .and_then(|()| root.present().map_err(|error| error.to_string()))
-            .map_err(|reason| CostError::Plot {
-                title: format!("{}: {}", study.title, plot.title),
-                reason,
-            })?;
+        let drawn = draw(&root, study, plot, size).and_then(|marks| {
+            root.present().map_err(|error| error.to_string())?;
+            Ok(marks)
+        });
+        drawn
+            .map_err(|reason| CostError::Plot { title: format!("{}: {}", study.title, plot.title), reason })?
+    };
+    let svg = with_colors_of_the_page(&svg);
+    let answering = answering(study, &marks).into_string();
+    Ok(match svg.rfind("</svg>") {
+        Some(end) => format!("{}{answering}{}", &svg[..end], &svg[end..]),
+        None => svg,
+    })
+}
+
+/// What answers around marks.
+fn answering(study: &Study, marks: &[Mark]) -> Markup {
+    html! {
+        @for mark in marks {
+            @if let Some(point) = study.points.get(mark.point) {
+                circle class="hit" cx=(mark.at.0) cy=(mark.at.1) r=(REACH) tabindex="0" role="button"
+                    data-point=(mark.point) data-details=(details_of(point)) aria-label=(details_of(point)) {}
+            }
+        }
     }
-    Ok(with_colors_of_the_page(&svg))
+}
+
+/// What there is to say of a point, a line each.
+fn details_of(point: &Point) -> String {
+    let numbers = point.parameters.iter().chain(&point.figures).chain(&point.counts);
+    let flip = point.error.and_then(|error| error.flip).map(|flip| format!("FLIP: {}", rounded(flip)));
+    let lines = [format!("{}, {}", point.series, point.label), cost_of(point)].into_iter();
+    let lines = lines.chain(flip).chain(numbers.map(|(name, value)| format!("{name}: {}", counted(*value))));
+    lines.filter(|line| !line.is_empty()).collect::<Vec<_>>().join("\n")
 }
 
 /// The series that a plot draws, with their places in the study's list, which their colours follow.
@@ -74,7 +114,7 @@ fn place(plot: &Plot, point: &Point) -> Option<(f64, f64)> {
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(), String> {
+fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<Vec<Mark>, String> {
     let told = |error: DrawingAreaErrorKind<_>| -> String { format!("{error:?}") };
     let series = drawn_series(study, plot);
     let points: Vec<(usize, &Point, (f64, f64))> = series
@@ -118,7 +158,10 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(
         .map_err(told)?;
     let onto = |(x, y): (f64, f64)| (x.max(across.from), y.max(up.from));
 
-    let front = if plot.front { pareto_front(points.iter().map(|(_, point, _)| *point)) } else { Vec::new() };
+    let front = match plot.front {
+        true => front_of(points.iter().map(|(_, point, _)| *point), |point| place(plot, point)),
+        false => Vec::new(),
+    };
     let corners: Vec<(f64, f64)> = front.iter().filter_map(|point| place(plot, point)).map(onto).collect();
     let steps: Vec<(f64, f64)> =
         corners.iter().zip(corners.iter().skip(1)).flat_map(|(a, b)| [*a, (b.0, a.1), *b]).collect();
@@ -158,8 +201,11 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(
     let mut taken: Vec<[i32; 4]> = Vec::new();
     let pixels = |line: &[(f64, f64)]| line.iter().map(|at| area.map_coordinate(at)).collect::<Vec<_>>();
     lines.iter().for_each(|line| taken.extend(along(&pixels(line))));
-    for (color, _, at) in &points {
+    let mut marks = Vec::new();
+    for (color, point, at) in &points {
         let (x, y) = area.map_coordinate(&onto(*at));
+        let number = study.points.iter().position(|other| std::ptr::eq(other, *point));
+        marks.extend(number.map(|point| Mark { point, at: (x, y) }));
         taken.push([x - MARK, y - MARK, x + MARK, y + MARK]);
         mark(root, *color, (x, y)).map_err(told)?;
     }
@@ -171,7 +217,7 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(
         let style = text(&INK).pos(Pos::new(HPos::Left, VPos::Center));
         root.draw(&Text::new(point.label.clone(), label.start, style)).map_err(told)?;
     }
-    Ok(())
+    Ok(marks)
 }
 
 /// Small boxes along a line of pixels.

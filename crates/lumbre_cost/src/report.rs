@@ -70,6 +70,12 @@ pub struct Study {
     pub notes: Vec<String>,
     /// Seconds that the study took.
     pub seconds: f64,
+    /// Which way of measuring it was ([`StudyKind::method`](crate::StudyKind)); 0 where a report does not say so.
+    #[serde(default)]
+    pub method: u32,
+    /// The program that measured it.
+    #[serde(default)]
+    pub version: String,
 }
 
 /// A choice, with what it costs and how far it is from the reference.
@@ -117,6 +123,18 @@ pub struct PointPicture {
     pub reference: String,
     /// What of it the point's error is.
     pub error_of: ErrorOver,
+    /// Where the error is of lightmaps: their texels, which have no picture to be shown.
+    #[serde(default)]
+    pub maps: Option<KeptMaps>,
+}
+
+/// Files of lightmaps, below the folder of the report, as `.exr`: the texels of all maps of a level one after the other, not a number where a texel shows no surface.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct KeptMaps {
+    /// Those of the point, without the extension.
+    pub picture: String,
+    /// Those that they are compared with.
+    pub reference: String,
 }
 
 /// What a point's relative RMSE and largest difference are of. FLIP is of the whole picture always.
@@ -223,13 +241,20 @@ impl Study {
             ..Point::default()
         };
         let points = counted.map(counts).collect();
-        let Self { name, title, question, .. } = self;
-        Self { name, title, question, points, ..Self::default() }
+        let Self { name, title, question, method, version, .. } = self;
+        Self { name, title, question, points, method, version, ..Self::default() }
     }
 
     /// The points of a series.
     pub fn of_series<'a>(&'a self, series: &'a str) -> impl Iterator<Item = &'a Point> {
         self.points.iter().filter(move |point| point.series == series)
+    }
+}
+
+impl Machine {
+    /// Whether both are the same machine with the same device; the programs that measured on it may differ.
+    pub fn is_same_place(&self, other: &Self) -> bool {
+        Self { version: String::new(), ..self.clone() } == Self { version: String::new(), ..other.clone() }
     }
 }
 

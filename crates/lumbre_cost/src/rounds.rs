@@ -20,22 +20,56 @@ pub struct Rounds {
 /// A piece of work, which answers with its milliseconds.
 pub type Work<'a> = Box<dyn FnMut() -> Result<f64, CostError> + 'a>;
 
-/// Does the work as often as [`Rounds::warm_up`] says, untimed. `go_on` is asked before each piece.
+/// Does some of the work as often as [`Rounds::warm_up`] says, untimed. `go_on` is asked before each piece.
 ///
 /// # Errors
 /// The first error of the work or of `go_on`.
-pub fn warm_up(
-    work: &mut [Work<'_>],
+pub fn warm_up<'a, 'w: 'a>(
+    work: impl IntoIterator<Item = &'a mut Work<'w>>,
     rounds: Rounds,
     go_on: &dyn Fn() -> Result<(), CostError>,
 ) -> Result<(), CostError> {
-    for _ in 0..rounds.warm_up {
-        for piece in work.iter_mut() {
+    for piece in work {
+        for _ in 0..rounds.warm_up {
             go_on()?;
             piece()?;
         }
     }
     Ok(())
+}
+
+/// Work that is too long for rounds by time, with what it made.
+#[derive(Clone, Debug)]
+pub struct Repeated<T> {
+    /// Milliseconds of each round.
+    pub times: Vec<f64>,
+    /// What the last round made.
+    pub made: T,
+}
+
+/// Does so many pieces of work in so many rounds (one at least), in turn, every other round backwards. `work` is told which piece it is and which shares of all are done before and after it, and
+/// answers with its milliseconds and what it made.
+///
+/// # Errors
+/// The first error of the work.
+pub fn repeated<T>(
+    pieces: usize,
+    rounds: usize,
+    mut work: impl FnMut(usize, [f64; 2]) -> Result<(f64, T), CostError>,
+) -> Result<Vec<Repeated<T>>, CostError> {
+    let rounds = rounds.max(1);
+    let mut done: Vec<Option<Repeated<T>>> = (0..pieces).map(|_| None).collect();
+    for round in 0..rounds {
+        for step in 0..pieces {
+            let piece = if round % 2 == 0 { step } else { pieces - 1 - step };
+            let share = |step: usize| (round * pieces + step) as f64 / (rounds * pieces) as f64;
+            let (time, made) = work(piece, [share(step), share(step + 1)])?;
+            let mut times = done[piece].take().map_or_else(Vec::new, |before| before.times);
+            times.push(time);
+            done[piece] = Some(Repeated { times, made });
+        }
+    }
+    Ok(done.into_iter().flatten().collect())
 }
 
 /// Does the work in rounds, after [`warm_up`]. Every other round goes backwards, so that none always follows the same one. `go_on` is asked between any two
@@ -92,6 +126,23 @@ mod tests {
         let times = in_rounds(&mut work, rounds, &|_| Ok(()));
         assert_eq!(times.ok(), Some(vec![vec![0.0; 2], vec![1.0; 2], vec![2.0; 2]]));
         assert_eq!(*order.borrow(), [0, 1, 2, 0, 1, 2, 2, 1, 0]);
+    }
+
+    #[test]
+    fn long_work_is_interleaved_and_keeps_what_it_made_last() {
+        let mut order = Vec::new();
+        let done = repeated(3, 2, |piece, [before, after]| {
+            order.push(piece);
+            assert!((after - before - 1.0 / 6.0).abs() < 1e-12);
+            Ok((order.len() as f64, (piece, order.len())))
+        });
+        let done = done.expect("nothing fails");
+        assert_eq!(order, [0, 1, 2, 2, 1, 0]);
+        assert_eq!(done[0].times, [1.0, 6.0]);
+        assert_eq!(done.iter().map(|one| one.made).collect::<Vec<_>>(), [(0, 6), (1, 5), (2, 4)]);
+        let failed =
+            repeated(2, 1, |piece, _| if piece == 1 { Err(CostError::Interrupted) } else { Ok((0.0, ())) });
+        assert!(matches!(failed, Err(CostError::Interrupted)));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::compile_ahead::device_ahead;
 use crate::converged::ConvergedBakes;
 use crate::folder::{Folder, has_pictures};
 use crate::machine::machine;
-use crate::studies::StudyKind;
+use crate::studies::{STUDIES, StudyKind};
 use crate::{Conditions, CostError, CostReport, Machine, Settings, Study};
 
 /// What a report is asked for.
@@ -29,7 +29,7 @@ pub struct CostOptions {
     pub size: (u32, u32),
     /// Of everything that draws random numbers.
     pub seed: u32,
-    /// Keeps the studies that the folder holds already, if they were measured on this machine and with these settings.
+    /// Keeps what the folder holds already of this machine and these settings: of the studies that are asked for those that this program has measured by the same method, and all others.
     pub resume: bool,
 }
 
@@ -60,16 +60,25 @@ pub fn measure(
     let folder = Folder::open(path)?;
     // Counts are nobody's: what they were counted on would be all that differs between two such reports.
     let machine = if options.counts_only { Machine::default() } else { machine(gpu) };
-    let mut report = CostReport { machine, settings: settings(options), studies: Vec::new() };
+    let settings = settings(options);
     let former = if options.resume { folder.report()? } else { None };
-    let former = former.filter(|kept| kept.machine == report.machine && kept.settings == report.settings);
+    let former = former.filter(|kept| kept.machine.is_same_place(&machine) && kept.settings == settings);
+    let mut studies = former.map_or_else(Vec::new, |former| former.studies);
+    // What is to be measured anew does not stand beside what is new meanwhile.
+    let is_current = |study: &Study, kind: &StudyKind| {
+        let is_whole = || study.points.iter().all(|point| has_pictures(folder.path(), point));
+        study.method == kind.method && study.version == machine.version && is_whole()
+    };
+    studies.retain(|study| {
+        let asked = options.studies.iter().find(|kind| kind.name == study.name);
+        asked.is_none_or(|kind| is_current(study, kind))
+    });
+    let mut report = CostReport { machine, settings, studies };
     let of = options.studies.len();
     let converged = ConvergedBakes::default();
     let ahead = device_ahead(gpu).filter(|_| !options.counts_only);
     for (number, kind) in options.studies.iter().enumerate() {
-        let kept = former.as_ref().and_then(|former| former.study(kind.name));
-        if let Some(kept) = kept.filter(|study| study.points.iter().all(|p| has_pictures(folder.path(), p))) {
-            report.studies.push(kept.clone());
+        if report.study(kind.name).is_some() {
             continue;
         }
         let listener = |fraction| told(CostProgress { study: kind.name, number, of, fraction });
@@ -83,6 +92,8 @@ pub fn measure(
             quick: options.quick,
             counts_only: options.counts_only,
             size: options.size,
+            size_of_report: options.size,
+            as_shown: !options.quick,
             seed: options.seed,
             folder: folder.path(),
             files: &options.files,
@@ -91,17 +102,26 @@ pub fn measure(
         conditions.tell(0.0)?;
         let begun = Instant::now();
         let measured = (kind.run)(&conditions)?;
+        let (method, version) = (kind.method, report.machine.version.clone());
+        let mut study = Study { method, version, ..measured.study.clone() };
         if options.counts_only {
-            report.studies.push(measured.study.counts_alone());
+            study = study.counts_alone();
         } else {
             folder.write_pictures(&measured)?;
-            let seconds = begun.elapsed().as_secs_f64();
-            report.studies.push(Study { seconds, ..measured.study });
+            study.seconds = begun.elapsed().as_secs_f64();
         }
+        insert(&mut report.studies, study);
         folder.write(&report)?;
     }
     folder.write(&report)?;
     Ok(report)
+}
+
+/// Puts a study in the place that it has on the page.
+fn insert(studies: &mut Vec<Study>, study: Study) {
+    let place = |name: &str| STUDIES.iter().position(|kind| kind.name == name);
+    let at = studies.iter().position(|other| place(&other.name) > place(&study.name));
+    studies.insert(at.unwrap_or(studies.len()), study);
 }
 
 fn settings(options: &CostOptions) -> Settings {

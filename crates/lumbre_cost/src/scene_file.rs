@@ -9,6 +9,7 @@ use lumbre_scene::{
     update_transforms,
 };
 
+use crate::command_line::quoted;
 use crate::{Conditions, CostError};
 
 /// A scene in a file.
@@ -45,7 +46,8 @@ impl SceneFile {
         let folder = conditions.folder.join("scenes");
         std::fs::create_dir_all(&folder)
             .map_err(|source| CostError::File { path: folder.clone(), source })?;
-        let path = folder.join(name).with_extension("glb");
+        // Not `with_extension`: a name may have a dot in it.
+        let path = folder.join(format!("{name}.glb"));
         save(&mut world, &path)?;
         Ok(Self { name: name.replace('-', " "), path, in_commands: format!("scenes/{name}.glb") })
     }
@@ -85,23 +87,5 @@ impl SceneFile {
     /// Its path in commands that are run in the report's folder.
     pub fn in_commands(&self) -> &str {
         &self.in_commands
-    }
-}
-
-/// A word of a shell's command.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "/._-+:".contains(c);
-    if word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_with_spaces_are_one_word() {
-        assert_eq!(quoted("/a/room-1.glb"), "/a/room-1.glb");
-        assert_eq!(quoted("a room.glb"), "'a room.glb'");
-        assert_eq!(quoted("it's"), r"'it'\''s'");
     }
 }

@@ -26,6 +26,7 @@ fn report() -> CostReport {
             picture: format!("pictures/x/{label}"),
             reference: "pictures/x/reference".into(),
             error_of: ErrorOver::Picture,
+            maps: None,
         }),
     };
     let plot = |across, up| Plot {

@@ -77,6 +77,30 @@ fn times_within_each_others_quartiles_decide_nothing() {
     assert!(!said.contains("cheapest is"), "{said}");
 }
 
+/// "fine" is nearer by the numbers and slower; but the reference does not tell the two errors apart.
+#[test]
+fn errors_within_what_the_reference_leaves_open_decide_nothing() {
+    let with = |series: &str, error: f64, ms: f64, uncertainty: f64| Point {
+        error: Some(ErrorOf { relative_rmse: error, uncertainty, ..ErrorOf::default() }),
+        ..point(series, "a", error, ms, 0.1)
+    };
+    let told = |uncertainty: f64| {
+        let points = [with("quick", 0.022, 1.0, uncertainty), with("fine", 0.020, 9.0, uncertainty)];
+        let all: Vec<&Point> = points.iter().collect();
+        let found = stretches(&all);
+        (found[0].cheapest.len(), found[0].by_error, cheapest_by_error(&all, "").unwrap())
+    };
+    let (cheapest, by_error, said) = told(0.0001);
+    assert_eq!((cheapest, by_error), (1, false));
+    assert!(said.starts_with("Below 2.20 % of error, down to 2.00 %, the cheapest is fine"), "{said}");
+    let (cheapest, by_error, said) = told(0.005);
+    assert_eq!((cheapest, by_error), (2, true));
+    assert!(said.contains("the times and errors do not decide between fine and quick"), "{said}");
+    // What is surely slower is ruled out all the same.
+    let points = [with("slow", 0.022, 20.0, 0.005), with("fine", 0.020, 9.0, 0.005)];
+    assert_eq!(stretches(&points.iter().collect::<Vec<_>>())[0].cheapest.len(), 1);
+}
+
 #[test]
 fn one_series_is_compared_with_nothing() {
     let points = [point("only", "a", 0.1, 1.0, 0.1), point("only", "b", 0.01, 9.0, 0.1)];
@@ -162,6 +186,51 @@ fn what_is_gone_is_worse_and_what_is_new_is_not() {
     let new = compare_reports(&one, &both, 1.1);
     assert!(new.len() == 1 && !new[0].is_worse(), "{new:?}");
     assert!(compare_reports(&one, &CostReport::default(), 1.1)[0].is_worse());
+}
+
+#[test]
+fn what_shrinks_comes_or_goes_is_reported_and_fails_only_where_something_is_lost() {
+    let before = report(vec![point("final", "a", 0.02, 10.0, 0.1)]);
+    let changed = |change: &dyn Fn(&mut Point)| {
+        let mut after = before.clone();
+        change(&mut after.studies[0].points[0]);
+        let found = compare_reports(&before, &after, 1.1);
+        assert_eq!(found.len(), 1, "{found:?}");
+        (found[0].is_worse(), found[0].is_slower(), found[0].to_string())
+    };
+    let named = |text: &str| format!("bake, final, a: {text}");
+    let shrunk = changed(&|point| *point.counts.get_mut("rays").unwrap() = 500.0);
+    assert_eq!(shrunk, (false, false, named("rays 500 instead of 1000 (0.500 times)")));
+    let new = changed(&|point| {
+        point.counts.insert("texels".into(), 3.0);
+    });
+    assert_eq!(new, (false, false, named("texels is counted for the first time")));
+    let better = changed(&|point| point.error.as_mut().unwrap().relative_rmse = 0.01);
+    assert_eq!(better, (false, false, named("error 1.00 % instead of 2.00 % (0.500 times)")));
+    let quicker = changed(&|point| {
+        point.milliseconds = Some(Spread { lower: 4.9, median: 5.0, upper: 5.1, rounds: 9 });
+    });
+    assert_eq!(quicker, (false, false, named("5.00 ± 0.100 ms instead of 10.0 ± 0.100 ms (0.500 times)")));
+    let untimed = changed(&|point| point.milliseconds = None);
+    assert_eq!(untimed, (false, false, named("has no time any more")));
+    let unjudged = changed(&|point| point.error = None);
+    assert_eq!(unjudged, (true, false, named("has no error any more")));
+    // The other way round, what is lost is gained.
+    let mut without = before.clone();
+    (without.studies[0].points[0].milliseconds, without.studies[0].points[0].error) = (None, None);
+    let gained = compare_reports(&without, &before, 1.1);
+    assert!(gained.len() == 2 && gained.iter().all(|change| !change.is_worse()), "{gained:?}");
+}
+
+#[test]
+fn studies_by_different_methods_are_not_compared() {
+    let mut before = report(vec![point("final", "a", 0.02, 10.0, 0.1)]);
+    let mut after = report(vec![point("final", "a", 0.20, 90.0, 0.1)]);
+    (before.studies[0].method, after.studies[0].method) = (1, 2);
+    let found = compare_reports(&before, &after, 1.1);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].to_string(), "bake: was measured by method 2 instead of 1, and is not compared");
+    assert!(!found[0].is_worse());
 }
 
 #[test]

@@ -14,12 +14,11 @@ use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{Bake, BakeOptions, BakeReport, CancelToken, Density, Quality};
-use lumbre_optics::{BakeMode, Light, LightKind, Material};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, CancelToken, Density, Quality, has_light_to_bake};
 use lumbre_scene::{
-    DynamicObject, GlobalTransform, IrradianceVolume, Lightmap, LoadError, LoadOptions, MaterialTextures,
-    Mesh, Name, PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject,
-    Transform, hidden_entities, save_baked,
+    GlobalTransform, IrradianceVolume, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh, Name,
+    PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject, Transform,
+    save_baked,
 };
 
 /// One of several bakes of increasing quality.
@@ -416,26 +415,6 @@ fn rougher(wanted: &BakeOptions, pass: &Pass, area: f64) -> BakeOptions {
 fn leaving_a_core(options: BakeOptions) -> BakeOptions {
     let cores = thread::available_parallelism().map_or(1, |cores| (cores.get() - 1).max(1));
     BakeOptions { threads: options.threads.or(Some(cores)), ..options }
-}
-
-/// Returns true if anything emits light that the baker takes: lamps, emissive surfaces or a sky.
-pub fn has_light_to_bake(world: &mut World) -> bool {
-    let bright = |color: Vec3| color.max_element() > 0.0;
-    let is_baked = |light: &Light| {
-        let kept = light.bake != BakeMode::Dynamic && light.kind != LightKind::Ambient;
-        light.enabled && kept && bright(light.diffuse)
-    };
-    let emits = |material: &Material| {
-        let back = material.back.as_ref().filter(|_| material.double_sided);
-        !material.unlit && (bright(material.front.emission) || back.is_some_and(|back| bright(back.emission)))
-    };
-    let hidden = hidden_entities(world);
-    world.get_resource::<SceneSettings>().is_some_and(|settings| bright(settings.sky))
-        || world.query::<&Light>().iter(world).any(is_baked)
-        || world
-            .query_filtered::<(Entity, &Material), (With<StaticObject>, Without<DynamicObject>)>()
-            .iter(world)
-            .any(|(entity, material)| emits(material) && !hidden.contains(&entity))
 }
 
 /// Returns the area of all static meshes in square metres.

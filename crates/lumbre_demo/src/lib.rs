@@ -55,10 +55,11 @@ mod window;
 
 pub use adaptation::Adaptation;
 #[cfg(feature = "window")]
-pub use background_bake::{BackgroundBake, BakeError, BakeNews, BakeStatus, BakedLight, has_light_to_bake};
+pub use background_bake::{BackgroundBake, BakeError, BakeNews, BakeStatus, BakedLight};
 pub use clock::{LONGEST_FRAME, STEP_SECONDS};
 pub use game::{Game, GameError, START_CAMERA, Viewpoint};
 pub use input::{Action, Input};
+pub use lumbre_bake::has_light_to_bake;
 pub use motion::{Bob, Flicker, Motion, MotionError, Orbit, Path, Pose, Spin, Swing};
 pub use moving::{ExtrasError, GameTime, Rest, move_things, read_motions};
 #[cfg(feature = "window")]

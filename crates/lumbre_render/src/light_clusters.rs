@@ -50,6 +50,8 @@ pub(crate) struct ClusteredView {
     pub size: [u32; 2],
     /// Depth range along the line of sight that contains anything to light, in metres.
     pub depths: [f64; 2],
+    /// No tile has a shorter side than this, in pixels.
+    pub finest_tile: u32,
 }
 
 /// The light lists of a frame. Its vectors are reused from frame to frame.
@@ -162,7 +164,7 @@ impl LightClusters {
         }
         let [near, far] = [near.max(view.depths[0]), far.min(view.depths[1])];
         let mut grid = None;
-        for side in TILE_SIDES {
+        for side in TILE_SIDES.into_iter().filter(|side| *side >= view.finest_tile) {
             let axes = Axis::both(view, side);
             let depths = Depths::new(view, side, near, far);
             self.tile_side = side;
@@ -173,10 +175,11 @@ impl LightClusters {
                 break;
             }
         }
-        // Not reached, because at least one side is tried.
+        // If every tile would be too fine, the coarsest is taken.
         grid.unwrap_or_else(|| {
-            let [columns, rows] = Axis::both(view, 32);
-            (columns, rows, Depths::new(view, 32, near, far))
+            self.tile_side = TILE_SIDES[TILE_SIDES.len() - 1];
+            let [columns, rows] = Axis::both(view, self.tile_side);
+            (columns, rows, Depths::new(view, self.tile_side, near, far))
         })
     }
 
@@ -491,7 +494,7 @@ mod tests {
             world.spawn((Camera { projection, exposure: 1.0 }, GlobalTransform(place.affine()))).id();
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let view = CameraView::new(&world, camera, aspect).unwrap();
-        ClusteredView { view, origin: DVec3::new(1.0, -2.0, 0.25), size, depths }
+        ClusteredView { view, origin: DVec3::new(1.0, -2.0, 0.25), size, depths, finest_tile: 0 }
     }
 
     /// Twin of `cluster_at` in shaders/light_clusters.wesl; `None` outside of the frame.
@@ -582,6 +585,17 @@ mod tests {
                 listed < most * seen,
                 "view {number}: {listed} listed for {seen} points, {reaching} reach"
             );
+        }
+    }
+
+    #[test]
+    fn no_tile_is_finer_than_was_asked_for() {
+        let view = view(Projection::perspective(1.0), [640, 360], [0.1, 100.0]);
+        let ball = BoundingSphere { light: 0, center: DVec3::ZERO, radius: 2.0 };
+        for (finest_tile, side) in [(0, 32), (32, 32), (100, 128), (256, 256), (u32::MAX, 16384)] {
+            let mut clusters = LightClusters::default();
+            clusters.build(&ClusteredView { finest_tile, ..view }, [&[ball], &[]], 1);
+            assert_eq!(clusters.tile_side, side, "{finest_tile}");
         }
     }
 

@@ -139,6 +139,10 @@ pub struct FrameOptions {
     pub specular_antialiasing: Option<bool>,
     /// Which lists lights are found by.
     pub light_lists: LightLists,
+    /// Lower bound of the side of a cluster's tile in pixels: finer tiles cost more lists and save lights. The
+    /// renderer has tiles of 32 pixels, of powers of two above that up to 1024, and one of the whole frame;
+    /// where the lists would be too many it takes coarser tiles by itself.
+    pub finest_cluster_tile: u32,
     /// Whether opaque surfaces are lit forward or deferred.
     pub rendering_path: RenderingPath,
     /// Uses the lightmaps. Without them, static lights shade lightmapped meshes like any other mesh.
@@ -185,6 +189,7 @@ impl Default for FrameOptions {
             flat_rule: None,
             specular_antialiasing: None,
             light_lists: LightLists::Auto,
+            finest_cluster_tile: 32,
             rendering_path: RenderingPath::Auto,
             lightmaps: true,
             irradiance_volumes: true,

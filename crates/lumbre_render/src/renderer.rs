@@ -380,7 +380,7 @@ impl Renderer {
             }
             None => self.decisions.keep(target, &decided.decision),
         }
-        let statistics = self.upload(&decided, &seen, clock)?;
+        let statistics = self.upload(&decided, &seen, options.finest_cluster_tile, clock)?;
         let statistics = Statistics { pipelines_awaited: awaited, ..statistics };
         Ok(LastFrame { asked, decided, statistics, view, exposure, waits: awaited > 0, drawn: None })
     }
@@ -615,6 +615,7 @@ impl Renderer {
         &mut self,
         decided: &Decided,
         seen: &Seen<'_>,
+        finest_tile: u32,
         clock: &mut StageClock,
     ) -> Result<Statistics, RenderError> {
         let Decided { draws, mirrors, lights, light_list, .. } = decided;
@@ -627,7 +628,7 @@ impl Renderer {
         let (origin, size) = (self.objects.origin, [seen.target.width, seen.target.height]);
         for ((view, draws), buffers) in views_of(decided, seen).zip(&mut self.views) {
             if let Some(depths) = draws.clustered_depths {
-                buffers.clusters.build(&ClusteredView { view, origin, size, depths }, lights);
+                buffers.clusters.build(&ClusteredView { view, origin, size, depths, finest_tile }, lights);
             }
         }
         let clustered = draws.clustered_depths.is_some();

@@ -282,8 +282,7 @@ mod tests {
 
     /// Triangles' bounds of all sizes, powers and directions, some of them two-sided, some in one place.
     fn emitters(numbers: &mut Numbers, count: usize) -> Vec<EmitterBounds> {
-        let vector =
-            |numbers: &mut Numbers| DVec3::new(numbers.next(), numbers.next(), numbers.next()) - 0.5;
+        let vector = |numbers: &mut Numbers| DVec3::new(numbers.next(), numbers.next(), numbers.next()) - 0.5;
         (0..count)
             .map(|index| {
                 let low = if index % 7 == 0 { DVec3::splat(2.0) } else { 10.0 * vector(numbers) };
@@ -307,7 +306,9 @@ mod tests {
                 let sum: f64 = (0..count).map(|emitter| tree.chance(emitter, point, normal)).sum();
                 assert!((0.0..=1.0 + 1e-9).contains(&sum), "{sum}");
                 for _ in 0..20 {
-                    let Some((emitter, chance)) = tree.choose(point, normal, numbers.next()) else { continue };
+                    let Some((emitter, chance)) = tree.choose(point, normal, numbers.next()) else {
+                        continue;
+                    };
                     let evaluated = tree.chance(emitter, point, normal);
                     assert!((evaluated - chance).abs() <= 1e-12 * chance, "{evaluated} for {chance}");
                 }

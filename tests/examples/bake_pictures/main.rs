@@ -1,6 +1,5 @@
-//! Draws the pictures of docs/baking.md into a folder: the Cornell box by its direct light and by all its light,
-//! the error that the bake states for each texel, and the error against the time. The last one is drawn from the
-//! table that `error_against_time` of `lumbre_bake` prints.
+//! Draws the pictures of docs/baking.md into a folder: the Cornell box by its direct light and by all of it, what the bake states of each
+//! texel's error, and the error against the time. The last is drawn from the table that `error_against_time` of `lumbre_bake` prints.
 //!
 //! `cargo run --release -p lumbre_tests --example bake_pictures -- MODEL.glb TABLE.md docs/images`
 
@@ -12,21 +11,23 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use image::{Rgb, RgbImage};
+use image::RgbImage;
 use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, TexelErrors};
 use lumbre_optics::Material;
 use lumbre_render::{Display, FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{Lightmap, LightmapImage, default_camera};
+use plotters::prelude::{Color, PathElement, RGBColor, Rectangle, Text};
 
-mod dots;
+mod drawing;
 mod plot;
 
-/// Side length of a frame in pixels.
+use drawing::{Outcome, drawing, text, with_picture};
+
+/// Pixels of a side of a frame.
 const SIDE: u32 = 360;
-/// Height in pixels of the strip above a frame.
+/// Pixels of the strip above a frame, and between two.
 const STRIP: u32 = 28;
-const WHITE: Rgb<u8> = Rgb([255; 3]);
-const BLACK: Rgb<u8> = Rgb([40; 3]);
+const GAP: u32 = 8;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<PathBuf> = std::env::args().skip(1).map(PathBuf::from).collect();
@@ -40,15 +41,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         Ok::<_, Box<dyn Error>>((frame(&gpu, &mut world, &options)?, title))
     });
     let [direct, all] = frames;
-    beside(&[direct?, all?]).save(folder.join("bake-bounces.png"))?;
-    sigma(&gpu, model)?.save(folder.join("bake-sigma.png"))?;
-    let plotted = plot::draw(&std::fs::read_to_string(table)?).ok_or("the table has no rows")?;
-    plotted.save(folder.join("bake-error-time.png"))?;
+    std::fs::write(folder.join("bake-bounces.svg"), beside(&[direct?, all?])?)?;
+    std::fs::write(folder.join("bake-sigma.svg"), sigma(&gpu, model)?)?;
+    std::fs::write(folder.join("bake-error-time.svg"), plot::draw(&std::fs::read_to_string(table)?)?)?;
     Ok(())
 }
 
-/// The model baked at 256 texels a side, with bounces or without; for the latter all materials are black and
-/// reflect nothing.
+/// The model baked at 256 texels a side, with bounces or without: what is black reflects nothing on.
 fn baked(model: &Path, direct: bool) -> Result<(World, BakeReport), Box<dyn Error>> {
     let mut world = World::new();
     lumbre_scene::load(&mut world, model)?;
@@ -76,19 +75,22 @@ fn frame(gpu: &Gpu, world: &mut World, options: &FrameOptions) -> Result<RgbImag
     RgbImage::from_raw(SIDE, SIDE, rgb).ok_or_else(|| "a frame has a pixel for each place".into())
 }
 
-/// Places frames side by side, each under its title.
-fn beside(frames: &[(RgbImage, &str)]) -> RgbImage {
+/// Frames beside each other under their titles.
+fn beside(frames: &[(RgbImage, &str)]) -> Outcome<String> {
     let count = frames.len() as u32;
-    let mut picture = RgbImage::from_pixel(count * (SIDE + 8) - 8, SIDE + STRIP, WHITE);
-    for (place, (frame, title)) in (0u32..).zip(frames) {
-        let left = i64::from(place * (SIDE + 8));
-        dots::write(&mut picture, title, [left + 4, 8], BLACK);
-        image::imageops::replace(&mut picture, frame, left, i64::from(STRIP));
-    }
-    picture
+    let lefts = (0..count).map(|place| place * (SIDE + GAP));
+    let titled = drawing((count * (SIDE + GAP) - GAP, SIDE + STRIP), |root| {
+        for ((_, title), left) in frames.iter().zip(lefts.clone()) {
+            root.draw(&Text::new((*title).to_owned(), (left as i32 + 4, 8), text()))?;
+        }
+        Ok(())
+    })?;
+    let into =
+        |svg: String, ((frame, _), left): (&(RgbImage, &str), u32)| with_picture(&svg, frame, (left, STRIP));
+    frames.iter().zip(lefts).try_fold(titled, into)
 }
 
-/// The colour map viridis, interpolated between five of its colours.
+/// Viridis by five of its colours.
 fn heat(part: f32) -> Vec3 {
     let colors = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]
         .map(|color: [u8; 3]| Vec3::from(color.map(|code| f32::from(code) / 255.0)));
@@ -97,13 +99,13 @@ fn heat(part: f32) -> Vec3 {
     colors[low].lerp(colors[low + 1], at - low as f32)
 }
 
-/// Smallest and largest error of the legend, relative to the mean light.
+/// Least and largest error of the legend, of the mean light.
 const RANGE: [f32; 2] = [0.002, 0.2];
 
-/// Draws the error that the bake states for every texel, on the surfaces, with a legend.
-fn sigma(gpu: &Gpu, model: &Path) -> Result<RgbImage, Box<dyn Error>> {
+/// What the bake states of every texel's error, on the surfaces, with a legend.
+fn sigma(gpu: &Gpu, model: &Path) -> Outcome<String> {
     let (mut world, report) = baked(model, false)?;
-    // A map contains E/π, and its errors have the same unit.
+    // A map holds E/π, and so do its errors.
     let mean = (report.mean_irradiance.iter().sum::<f64>() / 3.0 / std::f64::consts::PI) as f32;
     let part = |error: f32| (error / mean / RANGE[0]).ln() / (RANGE[1] / RANGE[0]).ln();
     let mut maps = world.query::<(&mut Lightmap, &TexelErrors, &mut Material)>();
@@ -113,27 +115,26 @@ fn sigma(gpu: &Gpu, model: &Path) -> Result<RgbImage, Box<dyn Error>> {
         map.image = Arc::new(LightmapImage { texels: texels.collect(), ..(*map.image).clone() });
         *material = Material::matt(Vec3::ONE);
     }
-    // The displayed colour is the number itself.
+    // A colour is the number that is shown.
     let options = FrameOptions { display: Display::Linear, exposure: Some(1.0), ..FrameOptions::default() };
     let drawn = frame(gpu, &mut world, &options)?;
-    let mut picture = RgbImage::from_pixel(SIDE + 150, SIDE + STRIP, WHITE);
-    image::imageops::replace(&mut picture, &drawn, 0, i64::from(STRIP));
-    dots::write(&mut picture, "stated error of a texel, of the mean", [4, 8], BLACK);
-    let (left, top, height) = (i64::from(SIDE) + 20, i64::from(STRIP) + 20, i64::from(SIDE) - 40);
-    for y in 0..height {
-        let color = heat(1.0 - y as f32 / height as f32) * 255.0;
-        let color = Rgb(color.to_array().map(|code| code.round() as u8));
-        (0..24).for_each(|x| dots::put(&mut picture, [left + x, top + y], color));
-    }
-    for percent in [0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0f32] {
-        let y = top + ((1.0 - part(percent / 100.0 * mean)) * height as f32) as i64;
-        dots::write(
-            &mut picture,
-            &format!("- {percent} %"),
-            [left + 26, y - i64::from(dots::HEIGHT) / 2],
-            BLACK,
-        );
-    }
+    let legend = drawing((SIDE + 150, SIDE + STRIP), |root| {
+        root.draw(&Text::new("stated error of a texel, of the mean", (4, 8), text()))?;
+        let (left, top, height) = (SIDE as i32 + 20, STRIP as i32 + 20, SIDE as i32 - 40);
+        for y in 0..height {
+            let [red, green, blue] =
+                (heat(1.0 - y as f32 / height as f32) * 255.0).to_array().map(|code| code.round() as u8);
+            let row = [(left, top + y), (left + 24, top + y + 1)];
+            root.draw(&Rectangle::new(row, RGBColor(red, green, blue).filled()))?;
+        }
+        for percent in [0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0f32] {
+            let y = top + ((1.0 - part(percent / 100.0 * mean)) * height as f32) as i32;
+            root.draw(&PathElement::new([(left + 24, y), (left + 30, y)], drawing::INK))?;
+            root.draw(&Text::new(format!("{percent} %"), (left + 34, y - drawing::FONT as i32 / 2), text()))?;
+        }
+        Ok(())
+    })?;
+    let picture = with_picture(&legend, &drawn, (0, STRIP))?;
     println!("stated error of the whole map: {:.2} %", 100.0 * report.estimated_error);
     Ok(picture)
 }

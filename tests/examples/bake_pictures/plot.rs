@@ -1,17 +1,14 @@
-//! Plots error against time, both on logarithmic axes, from the table that `error_against_time` prints.
+//! Error against time, both logarithmic, from the table that `error_against_time` prints. Not the measuring.
 
-use image::{Rgb, RgbImage};
+use plotters::prelude::*;
 
-use crate::dots;
-
-const BLACK: Rgb<u8> = Rgb([40, 40, 40]);
-const GREY: Rgb<u8> = Rgb([222, 222, 222]);
+use crate::drawing::{Area, GRID, INK, Outcome, drawing, rounded, text, ticks};
 
 /// A row of the table.
 struct Row {
     scene: String,
     variant: String,
-    /// Summed over all processors, so that other load on the machine hardly matters.
+    /// Of all processors: what others do on the machine hardly counts.
     seconds: f64,
     stated: f64,
     found: f64,
@@ -27,139 +24,108 @@ fn rows(table: &str) -> Vec<Row> {
     table.lines().filter_map(row).collect()
 }
 
-/// The mapping from numbers to pixels.
-struct Axes {
-    left: f64,
-    top: f64,
-    size: [f64; 2],
-    seconds: [f64; 2],
-    percent: [f64; 2],
-}
+const COLORS: [RGBColor; 4] =
+    [RGBColor(20, 90, 180), RGBColor(215, 95, 15), RGBColor(30, 140, 60), RGBColor(140, 60, 150)];
+/// Width and height of a panel, and the height of the names below all of them.
+const PANEL: (u32, u32) = (560, 430);
+const NAMES: u32 = 30;
+/// Half the side of a square.
+const MARK: i32 = 4;
 
-impl Axes {
-    fn place(&self, seconds: f64, percent: f64) -> [f64; 2] {
-        let part = |value: f64, [low, high]: [f64; 2]| (value / low).ln() / (high / low).ln();
-        [
-            self.left + part(seconds, self.seconds) * self.size[0],
-            self.top + (1.0 - part(percent, self.percent)) * self.size[1],
-        ]
-    }
-}
-
-/// Returns the nearest number above or below that is a power of ten times one, two or five.
-fn round(value: f64, up: bool) -> f64 {
-    let mut steps = (-4..5).flat_map(|power| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(power)));
-    if up {
-        steps.find(|step| *step >= value).unwrap_or(value)
-    } else {
-        steps.rfind(|step| *step <= value).unwrap_or(value)
-    }
-}
-
-fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
-    let steps = (-4..5).flat_map(|power| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(power)));
-    steps.filter(|step| (low * 0.999..=high * 1.001).contains(step)).collect()
-}
-
-fn line(picture: &mut RgbImage, from: [f64; 2], to: [f64; 2], color: Rgb<u8>, dashed: bool) {
-    let length = (to[0] - from[0]).hypot(to[1] - from[1]).ceil().max(1.0);
-    for step in 0..=length as u32 {
-        if dashed && step % 10 >= 5 {
-            continue;
-        }
-        let part = f64::from(step) / length;
-        let [x, y] = [0, 1].map(|axis| (from[axis] + (to[axis] - from[axis]) * part).round() as i64);
-        for place in [[x, y], [x + 1, y], [x, y + 1]] {
-            dots::put(picture, place, color);
-        }
-    }
-}
-
-fn square(picture: &mut RgbImage, [x, y]: [f64; 2], color: Rgb<u8>, full: bool) {
-    let reach = 4i64;
-    for dy in -reach..=reach {
-        for dx in -reach..=reach {
-            let rim = dx.abs() >= reach - 1 || dy.abs() >= reach - 1;
-            let paint = if full || rim { color } else { Rgb([255; 3]) };
-            dots::put(picture, [x.round() as i64 + dx, y.round() as i64 + dy], paint);
-        }
-    }
-}
-
-/// Pixels for the symbol before a name and the gap after it.
-const BESIDE_A_NAME: u32 = 36;
-
-const COLORS: [Rgb<u8>; 4] =
-    [Rgb([20, 90, 180]), Rgb([215, 95, 15]), Rgb([30, 140, 60]), Rgb([140, 60, 150])];
-
-/// Draws one panel for each scene, side by side.
-pub fn draw(table: &str) -> Option<RgbImage> {
+/// One panel for each scene, side by side, over the names of the variants.
+pub fn draw(table: &str) -> Outcome<String> {
     let rows = rows(table);
-    let mut scenes: Vec<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
-    scenes.dedup();
-    let (width, height) = (560, 460);
-    let mut picture = RgbImage::from_pixel(width * scenes.len() as u32, height, Rgb([255; 3]));
-    for (panel, scene) in scenes.iter().enumerate() {
-        let own: Vec<&Row> = rows.iter().filter(|row| row.scene == *scene).collect();
-        panel_of(&mut picture, f64::from(width) * panel as f64, scene, &own);
+    let scenes = each_once(rows.iter().map(|row| row.scene.as_str()));
+    let variants = each_once(rows.iter().map(|row| row.variant.as_str()));
+    if scenes.is_empty() {
+        return Err("the table has no rows".into());
     }
-    (!scenes.is_empty()).then_some(picture)
+    let size = (PANEL.0 * scenes.len() as u32, PANEL.1 + NAMES);
+    drawing(size, |root| {
+        let (panels, names) = root.split_vertically(PANEL.1);
+        for (panel, scene) in panels.split_evenly((1, scenes.len())).iter().zip(&scenes) {
+            let own: Vec<&Row> = rows.iter().filter(|row| row.scene == *scene).collect();
+            panel_of(panel, scene, &variants, &own)?;
+        }
+        for (place, variant) in variants.iter().enumerate() {
+            let x = 80 + 150 * place as i32;
+            square(&names, (x, 12), color_of(place), true)?;
+            names.draw(&Text::new((*variant).to_owned(), (x + 12, 5), text()))?;
+        }
+        Ok(())
+    })
 }
 
-fn panel_of(picture: &mut RgbImage, left: f64, scene: &str, rows: &[&Row]) {
+/// Names in the order in which they first come.
+fn each_once<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut found: Vec<&str> = Vec::new();
+    for name in names {
+        if !found.contains(&name) {
+            found.push(name);
+        }
+    }
+    found
+}
+
+fn color_of(place: usize) -> RGBColor {
+    COLORS[place % COLORS.len()]
+}
+
+fn panel_of(panel: &Area<'_>, scene: &str, variants: &[&str], rows: &[&Row]) -> Outcome<()> {
     let range = |values: &dyn Fn(&Row) -> [f64; 2]| {
         let all = || rows.iter().flat_map(|row| values(row));
-        [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)]
+        [rounded(all().fold(f64::INFINITY, f64::min), false), rounded(all().fold(0.0, f64::max), true)]
     };
-    let [fast, slow] = range(&|row| [row.seconds; 2]);
-    let [small, large] = range(&|row| [row.stated, row.found]);
-    let axes = Axes {
-        left: left + 78.0,
-        top: 40.0,
-        size: [450.0, 330.0],
-        seconds: [round(fast, false), round(slow, true)],
-        percent: [round(small, false), round(large, true)],
-    };
-    let [right, bottom] = [axes.left + axes.size[0], axes.top + axes.size[1]];
-    dots::write(picture, scene, [axes.left as i64, 12], BLACK);
-    for seconds in ticks(axes.seconds) {
-        let [x, _] = axes.place(seconds, axes.percent[0]);
-        line(picture, [x, axes.top], [x, bottom], GREY, false);
-        let label = format!("{seconds}");
-        dots::write(
-            picture,
-            &label,
-            [x as i64 - i64::from(dots::width(&label) / 2), bottom as i64 + 8],
-            BLACK,
-        );
-    }
-    for percent in ticks(axes.percent) {
-        let [_, y] = axes.place(axes.seconds[0], percent);
-        line(picture, [axes.left, y], [right, y], GREY, false);
-        let label = format!("{percent} %");
-        let x = axes.left as i64 - 8 - i64::from(dots::width(&label));
-        dots::write(picture, &label, [x, y as i64 - i64::from(dots::HEIGHT / 2)], BLACK);
-    }
-    let title = "processor seconds, all threads together";
-    dots::write(picture, title, [(right - f64::from(dots::width(title))) as i64, bottom as i64 + 32], BLACK);
-    let mut variants: Vec<&str> = Vec::new();
-    rows.iter().for_each(|row| {
-        if !variants.contains(&row.variant.as_str()) {
-            variants.push(&row.variant)
-        }
-    });
+    let [seconds, percent] = [range(&|row| [row.seconds; 2]), range(&|row| [row.stated, row.found])];
+    let mut chart = ChartBuilder::on(panel)
+        .caption(scene, text())
+        .margin(10)
+        .x_label_area_size(46)
+        .y_label_area_size(64)
+        .build_cartesian_2d(
+            (seconds[0]..seconds[1]).log_scale().with_key_points(ticks(seconds)),
+            (percent[0]..percent[1]).log_scale().with_key_points(ticks(percent)),
+        )?;
+    chart
+        .configure_mesh()
+        .x_desc("processor seconds, all threads together")
+        .y_desc("error, %")
+        .x_label_formatter(&|value| format!("{value}"))
+        .y_label_formatter(&|value| format!("{value}"))
+        .label_style(text())
+        .axis_desc_style(text())
+        .axis_style(INK)
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .draw()?;
     for (place, variant) in variants.iter().enumerate() {
-        let color = COLORS[place % COLORS.len()];
-        let own: Vec<&&Row> = rows.iter().filter(|row| row.variant == *variant).collect();
-        for (found, dashed) in [(false, true), (true, false)] {
-            let at = |row: &Row| axes.place(row.seconds, if found { row.found } else { row.stated });
-            own.windows(2).for_each(|pair| line(picture, at(pair[0]), at(pair[1]), color, dashed));
-            own.iter().for_each(|row| square(picture, at(row), color, found));
-        }
-        // The legend below, in a row.
-        let before: u32 = variants[..place].iter().map(|before| dots::width(before) + BESIDE_A_NAME).sum();
-        let [x, y] = [axes.left + f64::from(before) - 60.0, bottom + 62.0];
-        square(picture, [x, y], color, true);
-        dots::write(picture, variant, [x as i64 + 12, y as i64 - 7], color);
+        let own = || rows.iter().filter(|row| row.variant == *variant);
+        let color = color_of(place);
+        let stated: Vec<(f64, f64)> = own().map(|row| (row.seconds, row.stated)).collect();
+        let found: Vec<(f64, f64)> = own().map(|row| (row.seconds, row.found)).collect();
+        chart.draw_series(DashedLineSeries::new(stated.clone(), 5, 5, color.stroke_width(1)))?;
+        chart.draw_series(LineSeries::new(found.clone(), color.stroke_width(2)))?;
+        let area = chart.plotting_area();
+        let pixel = |at: &(f64, f64)| area.map_coordinate(at);
+        stated.iter().try_for_each(|at| square(panel, within(panel, pixel(at)), color, false))?;
+        found.iter().try_for_each(|at| square(panel, within(panel, pixel(at)), color, true))?;
     }
+    Ok(())
+}
+
+/// A pixel of the whole drawing as one of a part of it.
+fn within(part: &Area<'_>, (x, y): (i32, i32)) -> (i32, i32) {
+    let (left, top) = part.get_base_pixel();
+    (x - left, y - top)
+}
+
+fn square(area: &Area<'_>, (x, y): (i32, i32), color: RGBColor, full: bool) -> Outcome<()> {
+    let corners = [(x - MARK, y - MARK), (x + MARK, y + MARK)];
+    if full {
+        area.draw(&Rectangle::new(corners, color.filled()))?;
+    } else {
+        area.draw(&Rectangle::new(corners, WHITE.filled()))?;
+        area.draw(&Rectangle::new(corners, color.stroke_width(2)))?;
+    }
+    Ok(())
 }

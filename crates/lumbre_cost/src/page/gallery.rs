@@ -8,7 +8,8 @@ use crate::{Point, PointPicture, Study};
 
 /// The viewer of a study; nothing for a study without pictures.
 pub fn viewer(study: &Study, images: &Images<'_>) -> Markup {
-    let shown: Vec<Shown<'_>> = study.points.iter().filter_map(|point| Shown::of(point, images)).collect();
+    let shown: Vec<Shown<'_>> =
+        study.points.iter().enumerate().filter_map(|point| Shown::of(point, images)).collect();
     let mut references: Vec<(&str, String)> = Vec::new();
     for shown in &shown {
         let name = shown.files.reference.as_str();
@@ -47,7 +48,7 @@ pub fn viewer(study: &Study, images: &Images<'_>) -> Markup {
             div class="gallery" {
                 @for (place, shown) in shown.iter().enumerate() {
                     button type="button" aria-pressed=(if place == 0 { "true" } else { "false" })
-                        data-reference=(shown.files.reference) data-heat=(shown.heat) data-cost=(shown.cost) {
+                        data-point=(shown.number) data-reference=(shown.files.reference) data-heat=(shown.heat) data-cost=(shown.cost) {
                         img src=(shown.picture) alt="";
                         span { (shown.title) }
                     }
@@ -65,6 +66,8 @@ pub fn viewer(study: &Study, images: &Images<'_>) -> Markup {
 
 /// A point's picture, ready for the page.
 struct Shown<'a> {
+    /// The point's place in its study.
+    number: usize,
     files: &'a PointPicture,
     title: String,
     cost: String,
@@ -73,9 +76,10 @@ struct Shown<'a> {
 }
 
 impl<'a> Shown<'a> {
-    fn of(point: &'a Point, images: &Images<'_>) -> Option<Self> {
+    fn of((number, point): (usize, &'a Point), images: &Images<'_>) -> Option<Self> {
         let files = point.picture.as_ref()?;
         Some(Self {
+            number,
             files,
             title: format!("{}, {}", point.series, point.label),
             cost: cost_of(point),
@@ -85,7 +89,11 @@ impl<'a> Shown<'a> {
     }
 }
 
-/// A PNG within the page.
-fn inline(png: &[u8]) -> String {
-    format!("data:image/png;base64,{}", base64::encode(png))
+/// What every JPEG begins with.
+const JPEG: &[u8] = &[0xff, 0xd8];
+
+/// A picture within the page: a JPEG, or a PNG.
+fn inline(picture: &[u8]) -> String {
+    let kind = if picture.starts_with(JPEG) { "jpeg" } else { "png" };
+    format!("data:image/{kind};base64,{}", base64::encode(picture))
 }

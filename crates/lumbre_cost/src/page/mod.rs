@@ -8,7 +8,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use crate::plot::{PlotSize, SERIES_COLORS, draw_plot, drawn_series};
 use crate::{CostError, CostReport, Plot, Study};
 
-/// The bytes of a PNG by the name that a point has for its picture; nothing where it is not there.
+/// The bytes of a PNG or JPEG by the name that a point has for its picture; nothing where it is not there.
 pub type Images<'a> = dyn Fn(&str) -> Option<Vec<u8>> + 'a;
 
 const STYLE: &str = include_str!("page.css");
@@ -37,7 +37,7 @@ pub fn page(report: &CostReport, images: &Images<'_>) -> Result<String, CostErro
                 header {
                     h1 { "What accuracy costs in time" }
                     p {
-                        "Every choice has two prices: milliseconds, and how far the result is from a named reference. Times are medians over rounds in which all choices of a study take turns, with their quartiles as lines; errors are relative root mean squares. "
+                        "Every choice has two prices: milliseconds, and how far the result is from a named reference. Times are medians over rounds in which all choices of a study take turns, with their quartiles as lines; errors are relative root mean squares. A point of a plot that is pointed at or tapped says what it is, and shows its picture. "
                         "Measured on this machine, at these settings:"
                     }
                     (tables::conditions(report))
@@ -86,7 +86,9 @@ fn section(study: &Study, images: &Images<'_>) -> Result<Markup, CostError> {
             @if !study.notes.is_empty() {
                 ul class="notes" { @for note in &study.notes { li { (note) } } }
             }
-            p class="effort" { (format!("This study took {:.1} s.", study.seconds)) }
+            p class="effort" {
+                (format!("This study took {:.1} s (method {}, {}).", study.seconds, study.method, study.version))
+            }
         }
     })
 }
@@ -103,6 +105,7 @@ fn plot_figure(study: &Study, plot: &Plot) -> Result<Markup, CostError> {
             figcaption { (plot.title) }
             (wide)
             (narrow)
+            div class="tip" aria-live="polite" hidden { img alt=""; p {} }
             ul class="legend" {
                 @for (place, series) in drawn_series(study, plot) {
                     li { (legend_mark(place)) (series) }

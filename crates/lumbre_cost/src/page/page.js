@@ -26,3 +26,33 @@ for (const viewer of document.querySelectorAll(".viewer")) {
   choices.forEach((choice) => choice.addEventListener("change", show));
   slider.addEventListener("input", () => pair.style.setProperty("--at", `${slider.value}%`));
 }
+
+// Points of plots: pointed at, tapped or reached by the keyboard they say what they are; chosen, they show their picture in the viewer.
+for (const figure of document.querySelectorAll(".plot")) {
+  const tip = figure.querySelector(".tip");
+  const [image] = tip.getElementsByTagName("img"), [text] = tip.getElementsByTagName("p");
+  const section = figure.closest("section");
+  const buttonOf = (hit) => section.querySelector(`.gallery button[data-point="${hit.dataset.point}"]`);
+  const show = (hit) => {
+    const picture = buttonOf(hit)?.querySelector("img");
+    image.hidden = !picture;
+    if (picture) image.src = picture.src;
+    text.textContent = hit.dataset.details;
+    tip.hidden = false;
+    // Beside the point, within the figure.
+    const frame = figure.getBoundingClientRect(), mark = hit.getBoundingClientRect();
+    const left = mark.right - frame.left + 4, room = frame.width - tip.offsetWidth;
+    const beside = left <= room ? left : mark.left - frame.left - tip.offsetWidth - 4;
+    tip.style.left = `${Math.max(0, Math.min(beside, room))}px`;
+    tip.style.top = `${Math.max(0, mark.top - frame.top)}px`;
+  };
+  const hide = () => { tip.hidden = true; };
+  for (const hit of figure.querySelectorAll(".hit")) {
+    hit.addEventListener("pointerenter", () => show(hit));
+    hit.addEventListener("focus", () => show(hit));
+    hit.addEventListener("pointerleave", (event) => { if (event.pointerType === "mouse") hide(); });
+    hit.addEventListener("blur", hide);
+    hit.addEventListener("click", () => { show(hit); buttonOf(hit)?.click(); });
+    hit.addEventListener("keydown", (event) => { if (event.key === "Enter") buttonOf(hit)?.click(); });
+  }
+}

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes::tetrahedral_sphere;
-use lumbre_optics::{Light, Material, ReflectionModel, Surface};
+use lumbre_optics::{Light, Lobe, Material, ReflectionModel, Surface};
 use lumbre_scene::{Camera, Mesh, Name, Projection, Quadric, SceneSettings, Transform};
 
 /// What is varied about the ball.
@@ -17,6 +17,8 @@ pub struct Ball {
     pub shininess: f32,
     /// The model of its highlight.
     pub reflection: ReflectionModel,
+    /// What its highlight's brightness means.
+    pub lobe: Lobe,
 }
 
 /// Of the camera, in radians: the ball of radius 1 fills the frame but for a rim.
@@ -47,7 +49,7 @@ fn material(ball: Ball) -> Material {
         shininess: ball.shininess,
         ..Surface::default()
     };
-    Material { front, ..Material::default() }
+    Material { front, lobe: ball.lobe, ..Material::default() }
 }
 
 fn surroundings(ball: Ball) -> World {

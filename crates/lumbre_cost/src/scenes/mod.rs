@@ -1,17 +1,21 @@
 //! Scenes that studies make where none are given: each small, each for one question. Not their measuring.
 
+mod assorted_balls;
 mod ball;
 mod balls_and_lamps;
+mod every_effect;
 mod fence;
 mod mirror_and_glass;
 mod room;
 mod scan;
 mod sheet;
 
+pub use assorted_balls::assorted_balls;
 pub use ball::{Ball, ball, exact_ball};
 pub use balls_and_lamps::{BallsAndLamps, balls_and_lamps};
+pub use every_effect::every_effect;
 pub use fence::fence;
 pub use mirror_and_glass::mirror_and_glass;
-pub use room::{Air, room};
+pub use room::{Air, room, two_rooms};
 pub use scan::scan;
 pub use sheet::{Sheet, sheet};

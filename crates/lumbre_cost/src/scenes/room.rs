@@ -40,6 +40,27 @@ pub fn room(air: Air) -> World {
     world
 }
 
+/// Metres from the middle of one room to that of the next.
+const APART: f64 = 2.0 * SIZE.x;
+
+/// The room without haze, and another one like it beside it, whose light is its own: what moves in one changes nothing in the other.
+pub fn two_rooms() -> World {
+    let mut world = room(Air::Clear);
+    let placed =
+        world.query_filtered::<Entity, (With<Transform>, Without<Camera>)>().iter(&world).collect::<Vec<_>>();
+    for entity in placed {
+        let copy = world.entity_mut(entity).clone_and_spawn();
+        let mut copy = world.entity_mut(copy);
+        if let Some(mut place) = copy.get_mut::<Transform>() {
+            place.translation.x += APART;
+        }
+        if let Some(mut name) = copy.get_mut::<Name>() {
+            *name = Name::new(format!("{} next door", name.as_str()));
+        }
+    }
+    world
+}
+
 fn fixed(
     world: &mut World,
     name: &str,

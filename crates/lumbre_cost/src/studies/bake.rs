@@ -7,24 +7,28 @@ use lumbre_bake::{BakeOptions, Quality};
 use lumbre_render::FrameOptions;
 
 use super::over_scenes;
-use crate::baked::{bake_arguments, bake_options, bake_scene, maps_of, texel_error};
+use crate::baked::{
+    bake_arguments, bake_options, bake_scene, maps_of, nothing_to_bake, picture_of_maps, texel_error,
+};
 use crate::converged_bake::{converged, converged_bake};
-use crate::findings::{cheapest_by_error, counted, error_of, percent, rounded, short};
+use crate::findings::{cheapest_by_error, counted, error_of, percent, rounded, short, times_of};
 use crate::frames::draw_picture;
 use crate::measured::Measured;
+use crate::rounds::{Repeated, repeated};
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;
-use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
+use crate::{Conditions, CostError, Plot, Point, Quantity, Spread, Study};
 
 /// Errors that are asked for, as shares.
 const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01];
-const FEW_ERRORS: &[f64] = &[0.08, 0.03, 0.015];
-/// Bakes take seconds: each is done twice.
-const ROUNDS: usize = 2;
+const FEW_ERRORS: &[f64] = &[0.08, 0.03];
+/// The error that bakes of other studies are asked for, in a full and in a quick report.
+pub(super) const ERROR: f64 = 0.02;
+pub(super) const QUICK_ERROR: f64 = 0.06;
 /// Of the converged bake in a quick report: as long as in the other studies, so that they share it.
 pub(super) const REFERENCE_SECONDS: f64 = 1.5;
 /// Texels along a patch: the quality's own is 4.
-const PATCHES: &[f32] = &[16.0, 8.0, 4.0, 2.0];
+const PATCHES: &[f32] = &[16.0, 8.0, 2.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];
 const PATCH: &str = "texels along a patch";
 const ASKED: &str = "error asked for, %";
@@ -97,7 +101,7 @@ fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
         all.push(Asked { series: "patches", label: format!("{texels} texels a side"), options, more: "" });
     }
     // What bakes without smoothing cannot be asked for on the command line.
-    for &error in errors.iter().take(conditions.unless_quick(3, 1)) {
+    for &error in errors.iter().take(conditions.unless_quick(2, 1)) {
         let options = BakeOptions { error, denoise: false, ..options };
         all.push(Asked { series: "without smoothing", label: label(error), options, more: "" });
     }
@@ -110,10 +114,14 @@ fn of_scene(
     [before, after]: [f64; 2],
     measured: &mut Measured,
 ) -> Result<(), CostError> {
-    let options = bake_options(conditions, scene, conditions.unless_quick(4_000.0, 700.0))?;
+    if let Some(why) = nothing_to_bake(conditions, scene)? {
+        measured.study.notes.push(why);
+        return Ok(());
+    }
+    let options = bake_options(conditions, scene, conditions.unless_quick(2_500.0, 700.0))?;
     let part = |share: f64| before + share * (after - before);
     let options_of_truth =
-        converged(conditions, &options, conditions.reference_time(25.0, REFERENCE_SECONDS));
+        converged(conditions, &options, conditions.reference_time(12.0, REFERENCE_SECONDS));
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.0), part(0.4)])?;
     measured.study.notes.push(format!(
         "The converged bake of the {} took {:.0} s and states {} of its mean for itself.",
@@ -122,25 +130,19 @@ fn of_scene(
         percent(truth.report.error_of_mean)
     ));
     let reference = measured.keep_reference(&format!("{} converged", scene.name), truth.picture.clone());
+    let reference_maps =
+        measured.keep_reference(&format!("{} converged maps", scene.name), picture_of_maps(&truth.maps));
 
     let all = asked(conditions, options);
-    let mut times: Vec<Vec<f64>> = vec![Vec::new(); all.len()];
-    let mut last = Vec::new();
-    let rounds = conditions.repetitions(ROUNDS);
-    for round in 0..rounds {
-        last.clear();
-        for (place, asked) in all.iter().enumerate() {
-            let share =
-                |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (rounds * all.len()) as f64;
-            let told = [part(share(place)), part(share(place + 1))];
-            let baked = bake_scene(conditions, scene, &asked.options, told)?;
-            times[place].push(1e3 * baked.report.seconds);
-            last.push(baked);
-        }
-    }
+    let done = repeated(all.len(), conditions.repetitions(), |place, [from, to]| {
+        let told = [from, to].map(|share| part(0.4 + 0.6 * share));
+        let baked = bake_scene(conditions, scene, &all[place].options, told)?;
+        Ok((1e3 * baked.report.seconds, baked))
+    })?;
     let first = measured.study.points.len();
-    for ((asked, mut baked), times) in all.iter().zip(last).zip(&times) {
-        let error = texel_error(&maps_of(&mut baked.world), &truth.maps);
+    for (asked, Repeated { times, made: mut baked }) in all.iter().zip(done) {
+        let maps = maps_of(&mut baked.world);
+        let error = texel_error(&maps, &truth.maps);
         let picture = draw_picture(conditions, &mut baked.world, &FrameOptions::default())?;
         let report = &baked.report;
         let mut figures: Vec<(&str, f64)> = vec![(STATED, 100.0 * report.error_of_mean)];
@@ -155,14 +157,14 @@ fn of_scene(
             series: scene.series(conditions, asked.series),
             label: asked.label.clone(),
             parameters: parameters(asked),
-            milliseconds: Spread::of(times),
+            milliseconds: Spread::of(&times),
             error,
             counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
             figures: figures.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
-            command: command(scene, asked),
+            command: command(conditions, scene, asked),
             picture: None,
         };
-        measured.add_picture(point, picture, &reference, ErrorOver::Beyond)?;
+        measured.add_maps(point, (picture, &reference), (picture_of_maps(&maps), &reference_maps))?;
     }
     let points: Vec<&Point> = measured.study.points[first..].iter().collect();
     let findings = findings(scene, &points);
@@ -176,9 +178,9 @@ fn parameters(asked: &Asked) -> BTreeMap<String, f64> {
     [error].into_iter().chain(patch).collect()
 }
 
-fn command(scene: &SceneFile, asked: &Asked) -> String {
+fn command(conditions: &Conditions<'_>, scene: &SceneFile, asked: &Asked) -> String {
     if !asked.options.denoise {
-        return "lumbre cost -o again --study bake".into();
+        return conditions.again("bake");
     }
     let arguments = bake_arguments(&asked.options);
     format!("lumbre bake {} -o baked.glb {arguments}{}", scene.in_commands(), asked.more)
@@ -206,15 +208,15 @@ fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
     if let (Some(coarse), Some(fine)) = (finals.first(), finals.last())
         && let (Some(short), Some(long), Some(much), Some(little)) =
             (coarse.milliseconds, fine.milliseconds, coarse.error, fine.error)
-        && much.relative_rmse > little.relative_rmse
+        && much.relative_rmse - little.relative_rmse > much.uncertainty.max(little.uncertainty)
     {
         findings.push(format!(
-            "From {} to {} the error falls from {} to {} for {} times the time.",
+            "From {} to {} the error falls from {} to {}, for {}.",
             coarse.label,
             fine.label,
             error_of(&much),
             error_of(&little),
-            rounded(long.median / short.median)
+            times_of(&long, &short)
         ));
     }
     findings.extend(of_patches(points));
@@ -228,13 +230,13 @@ fn of_patches(points: &[&Point]) -> Option<String> {
     let count = |point: &Point| point.counts.get("patches").copied().map(counted);
     let (long, short) = (fine.milliseconds?, coarse.milliseconds?);
     Some(format!(
-        "{} patches of {} leave an error of {}, {} of {} one of {}, in {} times the time.",
+        "{} patches of {} leave an error of {}, {} of {} one of {}, in {}.",
         count(coarse)?,
         coarse.label,
         error_of(&coarse.error?),
         count(fine)?,
         fine.label,
         error_of(&fine.error?),
-        rounded(long.median / short.median)
+        times_of(&long, &short)
     ))
 }

@@ -1,19 +1,23 @@
 //! Every effect of a scene switched off in turn: what a frame saves without it, and what its picture loses.
 
+use lumbre_bake::{BakeOptions, Probes};
 use lumbre_render::{FrameOptions, removable_effects};
 use lumbre_scene::Census;
 
-use super::over_scenes;
-use crate::findings::{is_above_one, listed, listed_with, percent, ratio_of, rounded};
+use crate::baked::{bake_options, bake_scene};
+use crate::command_line::quoted;
+use crate::findings::{is_above_one, listed, listed_with, percent, ratio_of, rounded, rounds};
 use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
-use crate::scenes::Air;
+use crate::scenes::{Air, every_effect, room};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Seconds for the frames of each scene of a full report.
-const SECONDS: f64 = 16.0;
+const SECONDS: f64 = 9.0;
+/// Of the lightmaps of the room.
+const TEXELS: f64 = 4_000.0;
 /// Effects that are told of, the costliest.
 const TOLD: usize = 3;
 const SAVED: &str = "saved, ms";
@@ -23,9 +27,32 @@ const SAVED: &str = "saved, ms";
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    over_scenes(conditions, study(), ("hazy-room", Air::Hazy), |scene, told, measured| {
-        of_scene(conditions, scene, told, measured)
-    })
+    // A frame for each of many effects, most of which have shaders of their own.
+    let size = [conditions.size.0, conditions.size.1].map(|side| (2 * side / 3).max(8));
+    let conditions = &Conditions { size: (size[0], size[1]), ..*conditions };
+    let mut measured = Measured { study: study(), ..Measured::default() };
+    let scenes = match conditions.files.is_empty() {
+        true => vec![of_its_own(conditions)?],
+        false => SceneFile::given(conditions)?,
+    };
+    let count = scenes.len() as f64;
+    for (place, scene) in scenes.iter().enumerate() {
+        of_scene(conditions, scene, [place, place + 1].map(|place| place as f64 / count), &mut measured)?;
+    }
+    Ok(measured)
+}
+
+/// A room with every effect that can be left out, baked for its lightmaps and volumes; a quick report has half of them.
+fn of_its_own(conditions: &Conditions<'_>) -> Result<SceneFile, CostError> {
+    if conditions.quick {
+        return SceneFile::made(conditions, "hazy-room", room(Air::Hazy));
+    }
+    let name = "every-effect";
+    let scene = SceneFile::made(conditions, name, every_effect())?;
+    let options =
+        BakeOptions { probes: Probes::Always, error: 0.05, ..bake_options(conditions, &scene, TEXELS)? };
+    let baked = bake_scene(conditions, &scene, &options, [0.0, 0.05])?;
+    SceneFile::made(conditions, &format!("{name}-baked"), baked.world)
 }
 
 fn study() -> Study {
@@ -53,7 +80,9 @@ fn of_scene(
 ) -> Result<(), CostError> {
     let mut whole = scene.open(conditions.aspect())?;
     let effects = removable_effects(&Census::of(&mut whole), &FrameOptions::default());
-    let mut frames = vec![Frame::new(whole, FrameOptions::default()).sharing("effects")];
+    // Variants that count are compiled for nothing else: here for the whole frame alone.
+    let whole = Frame::new(whole, FrameOptions::default()).sharing("effects");
+    let mut frames = vec![whole.counting_lights(!conditions.quick)];
     for effect in &effects {
         let (mut world, mut options) = (scene.open(conditions.aspect())?, FrameOptions::default());
         effect.remove(&mut world, &mut options);
@@ -62,10 +91,9 @@ fn of_scene(
     let drawn = draw_frames(conditions, frames, SECONDS, told)?;
     let [whole, without @ ..] = &drawn[..] else { return Ok(()) };
     let reference = measured.keep_reference(&format!("{} with all", scene.name), whole.picture.clone());
-    let names = std::iter::once("with all effects".to_owned())
-        .chain(effects.iter().map(|effect| format!("without {}", effect.effect)));
-    for (name, frame) in names.zip(&drawn) {
-        let point = point(conditions, scene, name, whole, frame);
+    let left_out = std::iter::once(None).chain(effects.iter().map(|effect| Some(effect.effect)));
+    for (without, frame) in left_out.zip(&drawn) {
+        let point = point(conditions, scene, without, whole, frame);
         measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
     }
     let points = &measured.study.points[measured.study.points.len() - without.len()..];
@@ -78,7 +106,7 @@ fn of_scene(
 fn point(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
-    label: String,
+    without: Option<&str>,
     whole: &DrawnFrame,
     frame: &DrawnFrame,
 ) -> Point {
@@ -93,14 +121,13 @@ fn point(
     });
     Point {
         series: scene.name.clone(),
-        label,
+        label: without.map_or_else(|| "with all effects".to_owned(), |effect| format!("without {effect}")),
         milliseconds: frame.spread(),
         counts: frame.counts(),
         figures: figures.into_iter().flatten().collect(),
-        command: format!(
-            "lumbre explain {} --measure --size {}",
+        command: conditions.drawing(
             scene.in_commands(),
-            conditions.size_text()
+            &without.map_or_else(String::new, |effect| format!(" --without {}", quoted(effect))),
         ),
         ..Point::default()
     }
@@ -147,16 +174,23 @@ fn findings(
             told.join("; ")
         ));
     }
-    let open: Vec<&str> = known
+    let open: Vec<&(&str, Spread, f64)> =
+        known.iter().filter(|(_, ratio, _)| is_above_one(ratio).is_none()).collect();
+    let names: Vec<&str> = open.iter().map(|(effect, ..)| *effect).collect();
+    if let Some(fewest) = open.iter().map(|(_, ratio, _)| ratio.rounds).min() {
+        findings.push(format!(
+            "Whether {} anything in the {scene} is not distinguishable in {}.",
+            listed_with(&names, "costs", "cost", "or"),
+            rounds(fewest)
+        ));
+    }
+    let spared: Vec<&str> = known
         .iter()
-        .filter(|(_, ratio, _)| is_above_one(ratio).is_none())
+        .filter(|(_, ratio, _)| is_above_one(ratio) == Some(false))
         .map(|(effect, ..)| *effect)
         .collect();
-    if !open.is_empty() {
-        findings.push(format!(
-            "In the {scene} the times do not tell whether {} anything.",
-            listed_with(&open, "costs", "cost", "or")
-        ));
+    if !spared.is_empty() {
+        findings.push(format!("The frame of the {scene} takes longer without {}.", listed(&spared, "or")));
     }
     // What costs the most per loss: the first to go.
     let worth = |(_, ratio, error): &&&(&str, Spread, f64)| (ratio.median - 1.0) / error.max(1e-9);

@@ -7,31 +7,33 @@ use lumbre_bake::BakeOptions;
 use lumbre_render::FrameOptions;
 use lumbre_trace::{Integrator, TraceOptions};
 
+use super::bake::{ERROR, QUICK_ERROR};
 use super::over_scenes;
-use crate::baked::{bake_arguments, bake_options, bake_scene};
-use crate::findings::{cheapest_by_error, milliseconds, percent, rounded};
+use crate::baked::{Baked, bake_arguments, bake_options, bake_scene, nothing_to_bake};
+use crate::findings::{cheapest_by_error, error_of, milliseconds, percent, rounds, times_of};
 use crate::frame::Frame;
 use crate::frames::draw_frames;
 use crate::measured::Measured;
 use crate::picture::Picture;
-use crate::rounds::milliseconds_since;
+use crate::rounds::{Repeated, milliseconds_since, repeated};
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;
 use crate::traced::{ray_tree, traced};
 use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Paths a pixel.
-const PATHS: &[u32] = &[4, 16, 32];
-const FEW_PATHS: &[u32] = &[2, 8];
+const PATHS: &[u32] = &[4, 16];
+const FEW_PATHS: &[u32] = &[2, 6];
 /// Reflections after which paths are cut short.
-const BOUNCES: &[u32] = &[0, 1, 2, 4, 8];
-const FEW_BOUNCES: &[u32] = &[0, 1, 3];
+const BOUNCES: &[u32] = &[0, 1, 2, 4];
+const FEW_BOUNCES: &[u32] = &[0, 2];
 const REFLECTIONS: &str = "reflections on the way";
 /// Pictures are this part as wide and high as elsewhere: paths take their time.
 const SMALLER: u32 = 3;
 const SECONDS: f64 = 4.0;
 const CUT: &str = "paths cut short";
 const BAKE: &str = "baked before, ms";
+const WITH_LIGHTMAPS: &str = "and lightmaps";
 
 /// Measures it.
 ///
@@ -82,7 +84,7 @@ fn of_scene(
         samples: Some(samples),
         ..TraceOptions::default()
     };
-    let most = conditions.unless_quick(256, 32);
+    let most = conditions.unless_quick(128, 48);
     let (picture, report) = traced(conditions, scene, &paths(most))?;
     // The report states it of the mean; errors are of the root mean square.
     let open = report.standard_error.unwrap_or(0.0) * mean_over_root_mean_square(&picture);
@@ -90,9 +92,15 @@ fn of_scene(
     let uncertain = Some(ErrorOf { uncertainty: open, ..ErrorOf::default() });
     conditions.tell(part(0.5))?;
 
-    let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 700.0))?;
-    let bake = BakeOptions { error: 0.02, ..bake };
-    let baked = bake_scene(conditions, scene, &bake, [part(0.5), part(0.6)])?;
+    let bake = bake_options(conditions, scene, conditions.unless_quick(4_000.0, 700.0))?;
+    let bake = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..bake };
+    let baked: Option<Baked> = match nothing_to_bake(conditions, scene)? {
+        None => Some(bake_scene(conditions, scene, &bake, [part(0.5), part(0.6)])?),
+        Some(why) => {
+            measured.study.notes.push(why);
+            None
+        }
+    };
     let light = |shadows, multisample| FrameOptions {
         shadows,
         multisample: Some(multisample),
@@ -107,17 +115,16 @@ fn of_scene(
     for (_, options, _) in &steps {
         frames.push(Frame::new(scene.open(conditions.aspect())?, options.clone()).sharing("transport"));
     }
-    let bake_time = 1e3 * baked.report.seconds;
-    frames.push(Frame::new(baked.world, light(true, true)).sharing("transport"));
+    let bake_time = baked.as_ref().map_or(0.0, |baked| 1e3 * baked.report.seconds);
+    frames.extend(baked.map(|baked| Frame::new(baked.world, light(true, true)).sharing("transport")));
     let drawn = draw_frames(conditions, frames, SECONDS, [part(0.6), part(0.7)])?;
-    let labels = steps.iter().map(|(label, ..)| *label).chain(["and lightmaps"]);
+    let labels = steps.iter().map(|(label, ..)| *label).chain([WITH_LIGHTMAPS]);
     let more = steps.iter().map(|(.., more)| *more).chain([" --msaa"]);
     let first = measured.study.points.len();
     for ((label, more), frame) in labels.zip(more).zip(&drawn) {
-        let with_lightmaps = label == "and lightmaps";
+        let with_lightmaps = label == WITH_LIGHTMAPS;
         let file = if with_lightmaps { "baked.glb" } else { scene.in_commands() };
-        let draw =
-            format!("lumbre render {file} -o frame.exr --size {size}{more} --frames 20 --timings times.json");
+        let draw = conditions.drawing(file, more);
         let point = Point {
             series: series("frame"),
             label: label.to_owned(),
@@ -148,17 +155,14 @@ fn of_scene(
         (CUT, TraceOptions { depth: Some(depth), ..paths(samples) }, samples, asked)
     });
     let all: Vec<_> = trees.into_iter().chain(all).chain(bounces).collect();
-    for (place, (name, options, samples, asked)) in all.iter().enumerate() {
-        conditions.tell(part(0.7 + 0.3 * place as f64 / all.len() as f64))?;
-        let mut times = Vec::new();
-        let mut found = None;
-        for _ in 0..conditions.repetitions(conditions.unless_quick(3, 1)) {
-            let begun = Instant::now();
-            let one = traced(conditions, scene, options)?;
-            times.push(milliseconds_since(begun));
-            found = Some(one);
-        }
-        let Some((picture, report)) = found else { continue };
+    let done = repeated(all.len(), conditions.repetitions(), |place, [from, _]| {
+        conditions.tell(part(0.7 + 0.3 * from))?;
+        let begun = Instant::now();
+        let traced = traced(conditions, scene, &all[place].1)?;
+        Ok((milliseconds_since(begun), traced))
+    })?;
+    for ((name, options, samples, asked), Repeated { times, made: (picture, report) }) in all.iter().zip(done)
+    {
         let point = Point {
             series: series(name),
             label: match options.depth.filter(|_| *name == CUT) {
@@ -199,7 +203,9 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
         let (Some(was), Some(is)) = (pair[0].error, pair[1].error) else { continue };
         let (Some(short), Some(long)) = (pair[0].milliseconds, pair[1].milliseconds) else { continue };
         let cost = match (short.is_below(&long), long.is_below(&short)) {
-            (false, false) => "for a time that is not told apart".to_owned(),
+            (false, false) => {
+                format!("for a time that is not distinguishable in {}", rounds(short.rounds.min(long.rounds)))
+            }
             _ => format!("for {} instead of {}", milliseconds(&long), milliseconds(&short)),
         };
         let change = match (was.relative_rmse - is.relative_rmse).abs() > open {
@@ -226,17 +232,16 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
             .min_by(|a, b| a.2.median.total_cmp(&b.2.median));
         let paths = match reached {
             Some((point, _, slow)) => format!(
-                "paths get there with {}, in {}: {} times as long",
+                "paths get there with {}, in {}: {}",
                 point.label,
                 milliseconds(&slow),
-                rounded(slow.median / time.median)
+                times_of(&slow, &time)
             ),
             None => "no number of paths that was tried gets there".to_owned(),
         };
-        let bake = frame
-            .figures
-            .get(BAKE)
-            .map_or(String::new(), |ms| format!(", after a bake of {} s", rounded(ms / 1e3)));
+        let bake = frame.figures.get(BAKE).map_or(String::new(), |ms| {
+            format!(", after a bake of {} s", crate::findings::rounded(ms / 1e3))
+        });
         findings.push(format!(
             "The best frame (\"{}\") is off by {} in {}{bake}; {paths}. The reference leaves {} open.",
             frame.label,
@@ -257,7 +262,7 @@ fn of_bounces(points: &[&Point]) -> Option<String> {
         .filter_map(|point| {
             let after = point.parameters.get(REFLECTIONS)?;
             let (error, time) = (point.error?, point.milliseconds?);
-            Some(format!("{after}: {} in {}", percent(error.relative_rmse), milliseconds(&time)))
+            Some(format!("{after}: {} in {}", error_of(&error), milliseconds(&time)))
         })
         .collect();
     let all = !told.is_empty();

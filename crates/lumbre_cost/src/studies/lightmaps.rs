@@ -10,8 +10,9 @@ use lumbre_scene::{
     lightmap_to_open_exr,
 };
 
+use super::bake::{ERROR, QUICK_ERROR};
 use super::over_scenes;
-use crate::baked::{Baked, bake_arguments, bake_options, bake_scene};
+use crate::baked::{Baked, bake_arguments, bake_options, bake_scene, nothing_to_bake};
 use crate::findings::{listed, percent, rounded, short};
 use crate::frame::Frame;
 use crate::frames::draw_frames;
@@ -22,12 +23,15 @@ use crate::scenes::Air;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Texels of the reference; each density below has a quarter of the texels of the one before.
-const TEXELS: f64 = 40_000.0;
-const FEW_TEXELS: f64 = 6_000.0;
+const TEXELS: f64 = 20_000.0;
+const FEW_TEXELS: f64 = 4_000.0;
+/// Densities, as parts of the densest.
+const PARTS: &[f64] = &[1.0, 2.0, 4.0, 8.0];
+const FEW_PARTS: &[f64] = &[1.0, 2.0, 4.0];
 const DENSITY: &str = "texels along a metre";
 const BYTES: &str = "bytes of textures in that format";
 const BAKE: &str = "baked before, ms";
-const SECONDS: f64 = 8.0;
+const SECONDS: f64 = 5.0;
 
 /// How texels are kept on the GPU, and in which file.
 #[derive(Clone, Copy)]
@@ -90,11 +94,16 @@ fn study() -> Study {
         title: "Density and format of lightmaps".into(),
         question: "How many texels along a metre, and how many bytes for each: what does a frame lose, and what does it cost?".into(),
         reference: "the frame with the densest maps, in half floats".into(),
+        notes: vec![
+            "Frames unpack lightmaps when they are uploaded: on the device every format is half floats, so that the times of formats are those of one texture. Bytes are what each format takes itself."
+                .into(),
+        ],
         plots: vec![Plot {
             title: "Error against bytes".into(),
             across: Quantity::Count(BYTES.into()),
             up: Quantity::Error,
             joined: true,
+            front: true,
             ..Plot::default()
         }],
         ..Study::default()
@@ -114,22 +123,28 @@ fn of_scene(
     [before, after]: [f64; 2],
     measured: &mut Measured,
 ) -> Result<(), CostError> {
+    if let Some(why) = nothing_to_bake(conditions, scene)? {
+        measured.study.notes.push(why);
+        return Ok(());
+    }
     let part = |share: f64| before + share * (after - before);
     let options = bake_options(conditions, scene, conditions.unless_quick(TEXELS, FEW_TEXELS))?;
     let Density::TexelsPerMeter(densest) = options.density else { return Ok(()) };
     let mut all = Vec::new();
-    for (place, halved) in [1.0, 2.0, 4.0, 8.0].into_iter().enumerate() {
+    let parts = conditions.unless_quick(PARTS, FEW_PARTS);
+    let error = conditions.unless_quick(ERROR, QUICK_ERROR);
+    for (place, halved) in parts.iter().enumerate() {
         let density = densest / halved;
-        let options = BakeOptions { density: Density::TexelsPerMeter(density), error: 0.02, ..options };
-        let told = [place, place + 1].map(|place| part(0.6 * place as f64 / 4.0));
+        let options = BakeOptions { density: Density::TexelsPerMeter(density), error, ..options };
+        let told = [place, place + 1].map(|place| part(0.6 * place as f64 / parts.len() as f64));
         all.push(Maps { baked: bake_scene(conditions, scene, &options, told)?, options, density });
     }
     let mut frames = Vec::new();
     let mut points = Vec::new();
     for (place, maps) in all.iter_mut().enumerate() {
         for format in Format::ALL {
-            // Formats matter alike at every density: the densest two tell.
-            if place > 1 && !matches!(format, Format::Halves) {
+            // Formats matter alike at every density: the densest two tell, or the densest alone.
+            if place > conditions.unless_quick(1, 0) && !matches!(format, Format::Halves) {
                 continue;
             }
             let (world, sizes) = in_format(conditions, scene, &mut maps.baked.world, format)?;
@@ -196,12 +211,12 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Fo
     // Frames read the half floats that stand beside a packed file.
     let command = match format {
         Format::Halves => format!(
-            "lumbre bake {} -o baked.glb {} --exr half && lumbre render baked.glb -o frame.exr --size {} --frames 20 --timings times.json",
+            "lumbre bake {} -o baked.glb {} --exr half && {}",
             scene.in_commands(),
             bake_arguments(&maps.options),
-            conditions.size_text()
+            conditions.drawing("baked.glb", "")
         ),
-        Format::Packed(_) => "lumbre cost -o again --study lightmaps".to_owned(),
+        Format::Packed(_) => conditions.again("lightmaps"),
     };
     Point {
         series,

@@ -28,29 +28,57 @@ pub struct StudyKind {
     pub name: &'static str,
     /// What it is about, in a few words.
     pub about: &'static str,
+    /// Which way of measuring it that is. Whoever changes what its points, times or errors mean raises it: `--resume` keeps no study of another method, and `--compare` says so.
+    pub method: u32,
     /// Measures it.
     pub run: fn(&Conditions<'_>) -> Result<Measured, CostError>,
 }
 
 /// All studies, in the order of the page.
 pub const STUDIES: &[StudyKind] = &[
-    StudyKind { name: "shading", about: "flat, Gouraud and Phong shading", run: shading::run },
-    StudyKind { name: "scan", about: "the same on a scan at several resolutions", run: scan::run },
-    StudyKind { name: "need", about: "shading by need over the error allowed", run: shading_by_need::run },
-    StudyKind { name: "lamps", about: "many lights, and how they are found", run: lamps::run },
-    StudyKind { name: "shadows", about: "shadow maps by size and filter, against rays", run: shadows::run },
-    StudyKind { name: "effects", about: "every effect of a scene, switched off in turn", run: effects::run },
-    StudyKind { name: "bake", about: "the error that a bake is asked for", run: bake::run },
+    StudyKind { name: "shading", about: "flat, Gouraud and Phong shading", method: 2, run: shading::run },
+    StudyKind { name: "scan", about: "the same on a scan at several resolutions", method: 2, run: scan::run },
+    StudyKind {
+        name: "need",
+        about: "shading by need over the error allowed",
+        method: 2,
+        run: shading_by_need::run,
+    },
+    StudyKind { name: "lamps", about: "many lights, and how they are found", method: 2, run: lamps::run },
+    StudyKind {
+        name: "shadows",
+        about: "shadow maps by size and filter, against rays",
+        method: 2,
+        run: shadows::run,
+    },
+    StudyKind {
+        name: "effects",
+        about: "every effect of a scene, switched off in turn",
+        method: 2,
+        run: effects::run,
+    },
+    StudyKind { name: "bake", about: "the error that a bake is asked for", method: 2, run: bake::run },
     StudyKind {
         name: "preprocessing",
         about: "light that bounces, before the game or in it",
+        method: 2,
         run: preprocessing::run,
     },
-    StudyKind { name: "transport", about: "from the frame to the truth", run: light_transport::run },
-    StudyKind { name: "tour", about: "every camera's frame against the ray tree", run: tour::run },
-    StudyKind { name: "reflection", about: "reflection models against Phong's", run: reflection::run },
-    StudyKind { name: "lightmaps", about: "density and format of lightmaps", run: lightmaps::run },
-    StudyKind { name: "precision", about: "f32 on the device against f64", run: precision::run },
+    StudyKind {
+        name: "transport",
+        about: "from the frame to the truth",
+        method: 2,
+        run: light_transport::run,
+    },
+    StudyKind { name: "tour", about: "every camera's frame against the ray tree", method: 2, run: tour::run },
+    StudyKind {
+        name: "reflection",
+        about: "reflection models against Phong's",
+        method: 2,
+        run: reflection::run,
+    },
+    StudyKind { name: "lightmaps", about: "density and format of lightmaps", method: 2, run: lightmaps::run },
+    StudyKind { name: "precision", about: "f32 on the device against f64", method: 2, run: precision::run },
 ];
 
 /// A study of each file that was given, or, without one, of the room in this air under this name. `of_scene` is told which share of the study, from 0 to 1, a

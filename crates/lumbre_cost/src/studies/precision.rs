@@ -14,7 +14,7 @@ use crate::frames::draw_frames;
 use crate::measured::Measured;
 use crate::picture::Picture;
 use crate::rounded_lighting::{FORMATS, rounded_lighting};
-use crate::rounds::milliseconds_since;
+use crate::rounds::{Repeated, milliseconds_since, repeated};
 use crate::scene_file::SceneFile;
 use crate::scenes::{Sheet, sheet};
 use crate::traced::lighting_of;
@@ -30,7 +30,7 @@ const CASES: [(&str, Sheet); 7] = [
     ("a millimetre large", Sheet { scale: 5e-4, ..Sheet::PLAIN }),
     ("100 km large", Sheet { scale: 5e4, ..Sheet::PLAIN }),
 ];
-const SECONDS: f64 = 6.0;
+const SECONDS: f64 = 4.0;
 const F32: &str = "f32 frame";
 const F16: &str = "the frame kept in f16";
 const EIGHT: &str = "the frame kept in eight bits";
@@ -55,16 +55,15 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         scenes.push(scene);
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [0.0, 0.5])?;
-    for (place, ((name, _), (scene, frame))) in CASES.iter().zip(scenes.iter().zip(&drawn)).enumerate() {
-        conditions.tell(0.5 + 0.5 * place as f64 / CASES.len() as f64)?;
-        let mut times = Vec::new();
-        let mut exact = None;
-        for _ in 0..conditions.repetitions(3) {
-            let begun = Instant::now();
-            exact = Some(lighting_of(conditions, scene)?);
-            times.push(milliseconds_since(begun));
-        }
-        let Some(exact) = exact else { continue };
+    let traced = repeated(CASES.len(), conditions.repetitions(), |place, [from, _]| {
+        conditions.tell(0.5 + 0.5 * from)?;
+        let begun = Instant::now();
+        let exact = lighting_of(conditions, &scenes[place])?;
+        Ok((milliseconds_since(begun), exact))
+    })?;
+    for ((name, _), ((scene, frame), Repeated { times, made: exact })) in
+        CASES.iter().zip(scenes.iter().zip(&drawn).zip(traced))
+    {
         let reference = measured.keep_reference(&format!("f64 {name}"), exact.clone());
         let size = conditions.size_text();
         let point = |series: &str, time, command: String| Point {
@@ -74,21 +73,19 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
             command,
             ..Point::default()
         };
-        let draw = format!(
-            "lumbre render {} -o frame.exr --size {size} --frames 20 --timings times.json",
-            scene.in_commands()
-        );
+        let draw = conditions.drawing(scene.in_commands(), "");
         let trace = format!(
             "lumbre trace {} -o picture.exr --size {size} --depth 0 --no-shadows",
             scene.in_commands()
         );
+        // What becomes of a frame when it is kept in fewer bits has no command of its own.
         let kept = [
-            (F32, frame.picture.clone()),
-            (F16, in_halves(&frame.picture)),
-            (EIGHT, in_bytes(&frame.picture)),
+            (F32, frame.picture.clone(), draw),
+            (F16, in_halves(&frame.picture), conditions.again("precision")),
+            (EIGHT, in_bytes(&frame.picture), conditions.again("precision")),
         ];
-        for (series, picture) in kept {
-            let mut point = point(series, frame.spread(), draw.clone());
+        for (series, picture, command) in kept {
+            let mut point = point(series, frame.spread(), command);
             point.counts = frame.counts();
             measured.add_picture(point, picture, &reference, ErrorOver::Picture)?;
         }
@@ -96,7 +93,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
             let mut world = scene.open(conditions.aspect())?;
             let Some(rounded) = rounded_lighting(&mut world, conditions.size, format) else { continue };
             // Rounded by a program after each operation: that has no time of a device.
-            let mut point = point(format.name, None, "lumbre cost -o again --study precision".into());
+            let mut point = point(format.name, None, conditions.again("precision"));
             point.figures.insert(LOST.into(), 100.0 * rounded.lost);
             measured.add_picture(point, rounded.picture, &reference, ErrorOver::Picture)?;
         }
@@ -116,6 +113,7 @@ fn study() -> Study {
             title: "Error against time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
+            front: true,
             ..Plot::default()
         }],
         notes: vec![
@@ -202,18 +200,18 @@ fn findings(study: &Study) -> Vec<String> {
         }
     });
     let times = study.of_series(F32).zip(study.of_series(F64));
-    let factors: Vec<f64> = times
-        .filter_map(|(frame, rays)| Some(rays.milliseconds?.median / frame.milliseconds?.median))
-        .collect();
-    if let (Some(factor), Some(frame)) =
-        (Spread::of(&factors), study.of_series(F32).find_map(|p| p.milliseconds))
-    {
+    let pairs: Vec<(Spread, Spread)> =
+        times.filter_map(|(frame, rays)| Some((frame.milliseconds?, rays.milliseconds?))).collect();
+    let factors: Vec<f64> = pairs.iter().map(|(frame, rays)| rays.median / frame.median).collect();
+    let apart = pairs.iter().filter(|(frame, rays)| frame.is_below(rays)).count();
+    if let (Some(factor), Some((frame, _))) = (Spread::of(&factors), pairs.first()) {
         findings.push(format!(
-            "Rays in f64 take {} times as long as the frame in the median ({} to {}; a frame: {}).",
+            "Rays in f64 take longer than the frame in {apart} of {} cases, as far as the rounds tell: {} times as long in the median ({} to {}; a frame: {}).",
+            pairs.len(),
             rounded(factor.median),
             rounded(factor.lower),
             rounded(factor.upper),
-            milliseconds(&frame)
+            milliseconds(frame)
         ));
     }
     findings

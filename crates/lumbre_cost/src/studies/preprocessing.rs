@@ -3,7 +3,7 @@
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, Samples};
+use lumbre_bake::BakeOptions;
 use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
 use lumbre_scene::{
@@ -11,22 +11,23 @@ use lumbre_scene::{
     hidden_entities,
 };
 
-use super::bake::REFERENCE_SECONDS;
+use super::bake::{ERROR, QUICK_ERROR, REFERENCE_SECONDS};
 use super::over_scenes;
-use crate::baked::{Baked, bake_arguments, bake_options, bake_world, maps_of, texel_error};
+use crate::baked::{
+    Baked, bake_arguments, bake_options, bake_world, maps_of, nothing_to_bake, picture_of_maps, texel_error,
+};
 use crate::converged_bake::{converged, converged_bake};
-use crate::findings::{error_of, is_above_one, milliseconds, ratio_of, rounded};
+use crate::findings::{error_of, factor, milliseconds, ratio_of, rounded, times_of};
 use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames, draw_picture};
 use crate::measured::Measured;
 use crate::picture::Picture;
+use crate::rounds::{Repeated, repeated};
 use crate::scene_file::SceneFile;
-use crate::scenes::Air;
+use crate::scenes::{Air, two_rooms};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 const SECONDS: f64 = 4.0;
-/// Bakes take seconds: each is done so often.
-const ROUNDS: usize = 2;
 /// What moves goes by this part of its longest side.
 const STEP: f64 = 0.1;
 const FRAME: &str = "frame";
@@ -53,6 +54,7 @@ fn study() -> Study {
             title: "Error against time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
+            front: true,
             ..Plot::default()
         }],
         ..Study::default()
@@ -65,29 +67,59 @@ fn of_scene(
     [before, after]: [f64; 2],
     measured: &mut Measured,
 ) -> Result<(), CostError> {
+    if let Some(why) = nothing_to_bake(conditions, scene)? {
+        measured.study.notes.push(why);
+        return Ok(());
+    }
     let part = |share: f64| before + share * (after - before);
-    let options = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 700.0))?;
-    let options = BakeOptions { error: 0.02, ..options };
-    let time = conditions.reference_time(10.0, REFERENCE_SECONDS);
+    let options = options_of(conditions, scene, 1.0)?;
+    let options = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..options };
     // Of what is asked for, `error` alone does not matter to it.
-    let options_of_truth = converged(conditions, &options, time);
-    let open = || scene.open(conditions.aspect());
-    let (baked, samples) = bake_world(conditions, open()?, &options, None, [part(0.0), part(0.1)])?;
+    let options_of_truth = converged(conditions, &options, conditions.reference_time(8.0, REFERENCE_SECONDS));
+    let (baked, _) =
+        bake_world(conditions, scene.open(conditions.aspect())?, &options, None, [part(0.0), part(0.1)])?;
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.1), part(0.3)])?;
     let truth = truth.picture.clone();
     let first = measured.study.points.len();
-    let drawn = frames(conditions, scene, baked, &options, truth, [part(0.3), part(0.6)], measured)?;
+    let drawn = frames(conditions, scene, baked, &options, truth, [part(0.3), part(0.5)], measured)?;
     let findings = findings_of_frames(&scene.name, &measured.study.points[first..], &drawn);
     measured.study.findings.extend(findings);
+    match conditions.files.is_empty() {
+        true => {
+            // In one room hardly any light stays as it was, whatever moves.
+            let rooms = SceneFile::made(conditions, "two-rooms", two_rooms())?;
+            let options = options_of(conditions, &rooms, 2.0)?;
+            after_a_change(conditions, &rooms, &options, [part(0.5), part(1.0)], measured)
+        }
+        false => {
+            let options = options_of(conditions, scene, 1.0)?;
+            after_a_change(conditions, scene, &options, [part(0.5), part(1.0)], measured)
+        }
+    }
+}
 
-    let mut changed = open()?;
-    let Some(moved) = moved(&mut changed) else {
-        measured
-            .study
-            .notes
-            .push(format!("Nothing of {} could be moved: all of it shines or moves already.", scene.name));
+/// What bakes are asked for, of a level that is so many times as large as one room. With a larger error hardly any rays would be cast that a former bake could spare.
+fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Result<BakeOptions, CostError> {
+    let texels = rooms * conditions.unless_quick(4_000.0, 700.0);
+    Ok(BakeOptions { error: ERROR, ..bake_options(conditions, scene, texels)? })
+}
+
+/// Moves something of a scene, and bakes it whole and from what a former bake has kept.
+fn after_a_change(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    options: &BakeOptions,
+    [before, after]: [f64; 2],
+    measured: &mut Measured,
+) -> Result<(), CostError> {
+    let part = |share: f64| before + share * (after - before);
+    let open = || scene.open(conditions.aspect());
+    let Some(moved) = moved(&mut open()?) else {
+        let note = format!("Nothing of {} could be moved: all of it shines or moves already.", scene.name);
+        measured.study.notes.push(note);
         return Ok(());
     };
+    let (_, samples) = bake_world(conditions, open()?, options, None, [part(0.0), part(0.1)])?;
     let Some(samples) = samples else {
         measured.study.notes.push(format!("The bake of {} left no samples to keep.", scene.name));
         return Ok(());
@@ -98,45 +130,45 @@ fn of_scene(
         Ok(world)
     };
     let first = measured.study.points.len();
-    let (mut truth, _) = bake_world(conditions, changed()?, &options_of_truth, None, [part(0.6), part(0.8)])?;
+    let time = conditions.reference_time(8.0, REFERENCE_SECONDS);
+    let options_of_truth = converged(conditions, options, time);
+    let (mut truth, _) = bake_world(conditions, changed()?, &options_of_truth, None, [part(0.1), part(0.4)])?;
+    let drawn = draw_picture(conditions, &mut truth.world, &FrameOptions::default())?;
+    let reference = measured.keep_reference(&format!("{} changed, converged", scene.name), drawn);
     let truth = maps_of(&mut truth.world);
-    let (mut whole, mut kept) = (Vec::new(), Vec::new());
-    let mut last = None;
-    let rounds = conditions.repetitions(ROUNDS);
-    for round in 0..rounds {
-        let share = |step: usize| part(0.8 + 0.2 * (2 * round + step) as f64 / (2 * rounds) as f64);
-        let bake = |former: Option<&Samples>, step| {
-            let (baked, _) =
-                bake_world(conditions, changed()?, &options, former, [share(step), share(step + 1)])?;
-            Ok::<Baked, CostError>(baked)
-        };
-        let (of_all, of_change) = (bake(None, 0)?, bake(Some(&samples), 1)?);
-        whole.push(1e3 * of_all.report.seconds);
-        kept.push(1e3 * of_change.report.seconds);
-        last = Some([of_all, of_change]);
-    }
-    let labels = [format!("whole, {moved} moved"), format!("what {moved} changed")];
-    let whole_for = last.as_ref().and_then(|[_, of_change]| of_change.report.rebake.as_ref());
+    let reference_maps =
+        measured.keep_reference(&format!("{} changed, converged maps", scene.name), picture_of_maps(&truth));
+    let formers = [None, Some(&samples)];
+    let done = repeated(formers.len(), conditions.repetitions(), |place, [from, to]| {
+        let told = [from, to].map(|share| part(0.4 + 0.6 * share));
+        let (baked, _) = bake_world(conditions, changed()?, options, formers[place], told)?;
+        Ok((1e3 * baked.report.seconds, baked))
+    })?;
+    let whole_for = done.last().and_then(|of_change| of_change.made.report.rebake.as_ref());
     if let Some(why) = whole_for.map(|rebake| &rebake.whole).filter(|why| !why.is_empty()) {
         measured.study.notes.push(format!("Of {} nothing was kept: {why}.", scene.name));
     }
-    for ((mut baked, label), times) in last.into_iter().flatten().zip(labels).zip([&whole, &kept]) {
-        let error = texel_error(&maps_of(&mut baked.world), &truth);
-        measured.study.points.push(Point {
+    let labels = [format!("whole, {moved} moved"), format!("what {moved} changed")];
+    for (Repeated { times, made: mut baked }, label) in done.into_iter().zip(labels) {
+        let maps = maps_of(&mut baked.world);
+        let error = texel_error(&maps, &truth);
+        let frame = draw_picture(conditions, &mut baked.world, &FrameOptions::default())?;
+        let point = Point {
             series: scene.series(conditions, BAKE),
             label,
-            milliseconds: Spread::of(times),
+            milliseconds: Spread::of(&times),
             error,
             counts: [
                 ("rays".to_owned(), baked.report.rays as f64),
                 ("texels".to_owned(), baked.report.texels as f64),
             ]
             .into(),
-            command: "lumbre cost -o again --study preprocessing".into(),
+            command: conditions.again("preprocessing"),
             ..Point::default()
-        });
+        };
+        measured.add_maps(point, (frame, &reference), (picture_of_maps(&maps), &reference_maps))?;
     }
-    let finding = finding_of_change(&moved, &measured.study.points[first..], &whole, &kept);
+    let finding = finding_of_change(&scene.name, &moved, &measured.study.points[first..]);
     measured.study.findings.extend(finding);
     Ok(())
 }
@@ -168,22 +200,16 @@ fn frames(
     let labels = ["by lamps alone", "with the best ambient light", "with lightmaps"];
     for (label, frame) in labels.into_iter().zip(&drawn) {
         let has_lightmaps = label == labels[2];
-        let render = |file: &str| {
-            format!(
-                "lumbre render {file} -o frame.exr --size {} --frames 20 --timings times.json",
-                conditions.size_text()
-            )
-        };
         let command = match has_lightmaps {
             true => format!(
                 "lumbre bake {} -o baked.glb {} && {}",
                 scene.in_commands(),
                 bake_arguments(options),
-                render("baked.glb")
+                conditions.drawing("baked.glb", "")
             ),
-            false if label == labels[0] => render(scene.in_commands()),
+            false if label == labels[0] => conditions.drawing(scene.in_commands(), ""),
             // A file's ambient light cannot be told to `lumbre render`.
-            false => "lumbre cost -o again --study preprocessing".into(),
+            false => conditions.again("preprocessing"),
         };
         let mut point = Point {
             series: scene.series(conditions, FRAME),
@@ -245,19 +271,15 @@ fn findings_of_frames(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Ve
         "Without light that bounces, frames of the {scene} are off by {}; the best constant ambient light leaves {}, lightmaps {}.",
         errors[0], errors[1], errors[2]
     )];
-    let ratio = drawn.first().zip(drawn.last()).and_then(|(alone, lit)| ratio_of(&lit.times, &alone.times));
-    let before = lightmaps.figures.get(BEFORE);
-    if let (Some(ratio), Some(time), Some(bake)) = (ratio, &lightmaps.milliseconds, before) {
-        let decided = match is_above_one(&ratio) {
-            Some(true) => "",
-            Some(false) => ", since static lamps are not shaded any more",
-            None => ", which is not told apart from 1",
-        };
+    if let Some((alone, lit)) = drawn.first().zip(drawn.last())
+        && let Some(ratio) = ratio_of(&lit.times, &alone.times)
+        && let (Some(time), Some(bake)) = (&lightmaps.milliseconds, lightmaps.figures.get(BEFORE))
+    {
+        let [before, after] =
+            [alone, lit].map(|frame| rounded(f64::from(frame.statistics.lights_per_object)));
         findings.push(format!(
-            "With lightmaps a frame takes {} of its time without them ({} to {}){decided}; they take {} s once, as long as {} such frames ({}).",
-            rounded(ratio.median),
-            rounded(ratio.lower),
-            rounded(ratio.upper),
+            "With lightmaps a frame takes {} of its time without them, and an object in view has {after} lights in its list in place of {before}, on average; the lightmaps take {} s once, as long as {} such frames ({}).",
+            factor(&ratio),
             rounded(1e-3 * bake),
             rounded(bake / time.median.max(1e-9)),
             milliseconds(time)
@@ -266,15 +288,14 @@ fn findings_of_frames(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Ve
     findings
 }
 
-fn finding_of_change(moved: &str, points: &[Point], whole: &[f64], kept: &[f64]) -> Option<String> {
+fn finding_of_change(scene: &str, moved: &str, points: &[Point]) -> Option<String> {
     let [all, changed] = points else { return None };
-    let ratio = ratio_of(kept, whole)?;
     let rays = |point: &Point| point.counts.get("rays").copied().unwrap_or(0.0);
     let error =
         |point: &Point| point.error.map_or_else(|| "an unknown error".to_owned(), |error| error_of(&error));
     Some(format!(
-        "After \"{moved}\" has moved, baking what has changed takes {} of a whole bake's time and {} of its rays, with {} of error beside {}.",
-        rounded(ratio.median),
+        "After \"{moved}\" of the {scene} has moved, baking what has changed takes {}, beside a whole bake, and {} of its rays, with {} of error beside {}.",
+        times_of(&changed.milliseconds?, &all.milliseconds?),
         rounded(rays(changed) / rays(all).max(1.0)),
         error(changed),
         error(all)

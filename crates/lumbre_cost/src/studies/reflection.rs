@@ -1,10 +1,10 @@
 //! Reflection models beside Phong's: how far their highlights are from his over exponents and angles of incidence, and what they cost.
 
 use glam::{DVec3, Vec3};
-use lumbre_optics::{ReflectionModel, Surface, SurfaceSample, specular_reflection};
+use lumbre_optics::{Lobe, ReflectionModel, Surface, SurfaceSample, specular_reflection};
 use lumbre_render::FrameOptions;
 
-use crate::findings::{is_above_one, percent, rounded};
+use crate::findings::{factor, percent};
 use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
@@ -15,11 +15,26 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Stu
 const EXPONENTS: &[f32] = &[4.0, 16.0, 64.0, 256.0];
 const FEW_EXPONENTS: &[f32] = &[8.0, 64.0];
 const EXPONENT: &str = "exponent";
+/// What is measured: each model with the documents' bare lobe, and Blinn's with one that keeps its energy.
+fn variants() -> Vec<Variant> {
+    let bare = |&model| Variant { model, lobe: Lobe::Bare };
+    let keeping = Variant { model: ReflectionModel::Blinn, lobe: Lobe::EnergyKeeping };
+    // Phong's is the first: all others are compared with it.
+    ReflectionModel::ALL.iter().map(bare).chain([keeping]).collect()
+}
+
+/// A reflection model, and what its highlight's brightness means.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Variant {
+    model: ReflectionModel,
+    lobe: Lobe,
+}
+
 /// Angles between light and normal, in degrees.
 const INCIDENCES: [f64; 4] = [0.0, 30.0, 60.0, 80.0];
 /// Fine enough for its facets not to be seen.
 const DEPTH: u32 = 6;
-const SECONDS: f64 = 16.0;
+const SECONDS: f64 = 8.0;
 
 /// Measures it.
 ///
@@ -31,24 +46,30 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         measured.study.notes.push("The given files were not looked at: this study is of one ball.".into());
     }
     let exponents = conditions.unless_quick(EXPONENTS, FEW_EXPONENTS);
+    let variants = variants();
     let mut frames = Vec::new();
-    let mut scenes = Vec::new();
+    let mut scenes: Vec<Vec<SceneFile>> = Vec::new();
     for &shininess in exponents {
-        let asked = Ball { depth: DEPTH, shininess, reflection: ReflectionModel::Phong };
-        let scene = SceneFile::made(conditions, &format!("ball-exponent-{shininess}"), ball(asked))?;
-        for &model in ReflectionModel::ALL {
-            let options = FrameOptions { reflection: Some(model), ..FrameOptions::default() };
-            frames.push(Frame::new(scene.open(conditions.aspect())?, options).sharing(model.name()));
+        let made = |lobe: Lobe, name: String| {
+            let asked = Ball { depth: DEPTH, shininess, reflection: ReflectionModel::Phong, lobe };
+            SceneFile::made(conditions, &name, ball(asked))
+        };
+        let bare = made(Lobe::Bare, format!("ball-exponent-{shininess}"))?;
+        let keeping = made(Lobe::EnergyKeeping, format!("ball-exponent-{shininess}-energy-keeping"))?;
+        let of = |variant: &Variant| if variant.lobe == Lobe::Bare { bare.clone() } else { keeping.clone() };
+        let own: Vec<SceneFile> = variants.iter().map(of).collect();
+        for (variant, scene) in variants.iter().zip(&own) {
+            let options = FrameOptions { reflection: Some(variant.model), ..FrameOptions::default() };
+            frames.push(Frame::new(scene.open(conditions.aspect())?, options).sharing(name_of(*variant)));
         }
-        scenes.push(scene);
+        scenes.push(own);
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [0.0, 1.0])?;
-    let models = ReflectionModel::ALL.len();
-    for ((scene, &shininess), drawn) in scenes.iter().zip(exponents).zip(drawn.chunks(models)) {
+    for ((scenes, &shininess), drawn) in scenes.iter().zip(exponents).zip(drawn.chunks(variants.len())) {
         let reference =
             measured.keep_reference(&format!("Phong exponent {shininess}"), drawn[0].picture.clone());
-        for (&model, frame) in ReflectionModel::ALL.iter().zip(drawn) {
-            let point = point(conditions, scene, model, shininess, frame);
+        for ((&variant, scene), frame) in variants.iter().zip(scenes).zip(drawn) {
+            let point = point(conditions, scene, variant, shininess, frame);
             measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
         }
     }
@@ -60,7 +81,7 @@ fn study() -> Study {
     Study {
         name: "reflection".into(),
         title: "Reflection models beside Phong's".into(),
-        question: "Blinn's half vector with the exponent as it is, with four times it, fitted to it, and Torrance and Sparrow's facets: how far are their highlights from Phong's, and do they cost more, as document [M] says of Blinn's?".into(),
+        question: "Blinn's half vector with the exponent as it is, with four times it, fitted to it, or keeping its energy, and Torrance and Sparrow's facets: how far are their highlights from Phong's, and do they cost more, as document [M] says of Blinn's?".into(),
         reference: "the same ball under Phong's model with the same exponent".into(),
         plots: vec![
             Plot {
@@ -82,8 +103,9 @@ fn study() -> Study {
     }
 }
 
-fn name_of(model: ReflectionModel) -> &'static str {
-    match model {
+fn name_of(variant: Variant) -> &'static str {
+    match variant.model {
+        _ if variant.lobe == Lobe::EnergyKeeping => "Blinn, energy-keeping",
         ReflectionModel::Phong => "Phong",
         ReflectionModel::Blinn => "Blinn, n",
         ReflectionModel::Blinn4n => "Blinn, 4n",
@@ -95,36 +117,32 @@ fn name_of(model: ReflectionModel) -> &'static str {
 fn point(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
-    model: ReflectionModel,
+    variant: Variant,
     shininess: f32,
     frame: &DrawnFrame,
 ) -> Point {
     let over_incidences = INCIDENCES.iter().map(|degrees| {
-        let apart = lobes_apart(model, shininess, degrees.to_radians());
+        let apart = lobes_apart(variant, shininess, degrees.to_radians());
         (format!("off at {degrees}°, %"), 100.0 * apart)
     });
     Point {
-        series: name_of(model).into(),
+        series: name_of(variant).into(),
         label: format!("exponent {shininess}"),
         parameters: [(EXPONENT.to_owned(), f64::from(shininess))].into(),
         milliseconds: frame.spread(),
         counts: frame.counts(),
         figures: over_incidences.collect(),
-        command: format!(
-            "lumbre render {} -o frame.exr --reflection {} --size {} --frames 20 --timings times.json",
-            scene.in_commands(),
-            model.name(),
-            conditions.size_text()
-        ),
+        command: conditions.drawing(scene.in_commands(), &format!(" --reflection {}", variant.model.name())),
         ..Point::default()
     }
 }
 
 /// Root mean square difference of a model's highlight from Phong's over that of Phong's, over the directions of view above a surface, in f64.
-fn lobes_apart(model: ReflectionModel, shininess: f32, incidence: f64) -> f64 {
+fn lobes_apart(variant: Variant, shininess: f32, incidence: f64) -> f64 {
     const STEPS: u32 = 90;
     let surface = Surface { specular: Vec3::ONE, shininess, ..Surface::default() };
-    let surface = SurfaceSample::from(&surface);
+    let bare = SurfaceSample::from(&surface);
+    let own = SurfaceSample { lobe: variant.lobe, ..bare };
     let light = DVec3::new(incidence.sin(), incidence.cos(), 0.0);
     let (mut squares, mut of_phong) = (0.0, 0.0);
     for row in 0..STEPS {
@@ -133,10 +151,10 @@ fn lobes_apart(model: ReflectionModel, shininess: f32, incidence: f64) -> f64 {
             let around = (f64::from(column) + 0.5) / f64::from(STEPS) * std::f64::consts::PI;
             let (sine, cosine) = elevation.sin_cos();
             let viewer = DVec3::new(sine * around.cos(), cosine, sine * around.sin());
-            let highlight = |model| specular_reflection(model, &surface, DVec3::Y, light, viewer).x;
-            let phong = highlight(ReflectionModel::Phong);
+            let highlight = |model, surface| specular_reflection(model, surface, DVec3::Y, light, viewer).x;
+            let phong = highlight(ReflectionModel::Phong, &bare);
             // The sine is the share of the hemisphere that a step of elevation has.
-            squares += sine * (highlight(model) - phong).powi(2);
+            squares += sine * (highlight(variant.model, &own) - phong).powi(2);
             of_phong += sine * phong.powi(2);
         }
     }
@@ -144,26 +162,21 @@ fn lobes_apart(model: ReflectionModel, shininess: f32, incidence: f64) -> f64 {
 }
 
 fn findings(study: &Study, drawn: &[DrawnFrame]) -> Vec<String> {
-    let models = ReflectionModel::ALL;
+    let variants = variants();
     let mut costs = Vec::new();
     let mut nearest: Option<(&str, f64)> = None;
-    for (place, &model) in models.iter().enumerate().skip(1) {
+    for (place, &variant) in variants.iter().enumerate().skip(1) {
+        let name = name_of(variant);
         // Over all exponents: pairs of the same rounds.
-        let pairs = drawn.chunks(models.len()).flat_map(|all| all[place].times.iter().zip(&all[0].times));
+        let pairs = drawn.chunks(variants.len()).flat_map(|all| all[place].times.iter().zip(&all[0].times));
         let ratios: Vec<f64> = pairs.map(|(time, of_phong)| time / of_phong.max(1e-9)).collect();
-        if let Some(ratio) = Spread::of(&ratios) {
-            let range = format!("{} to {}", rounded(ratio.lower), rounded(ratio.upper));
-            costs.push(match is_above_one(&ratio) {
-                Some(_) => {
-                    format!("{} takes {} of Phong's time ({range})", name_of(model), rounded(ratio.median))
-                }
-                None => format!("{} is not told apart from Phong ({range} of its time)", name_of(model)),
-            });
+        if let Some(ratio) = Spread::of_median(&ratios) {
+            costs.push(format!("{name} takes {} of Phong's time", factor(&ratio)));
         }
-        let errors = study.of_series(name_of(model)).filter_map(|point| point.error);
+        let errors = study.of_series(name).filter_map(|point| point.error);
         let largest = errors.map(|error| error.relative_rmse).fold(0.0, f64::max);
         if nearest.is_none_or(|(_, least)| largest < least) {
-            nearest = Some((name_of(model), largest));
+            nearest = Some((name, largest));
         }
     }
     let mut findings = vec![format!("{}.", costs.join("; "))];

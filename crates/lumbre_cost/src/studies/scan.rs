@@ -25,7 +25,7 @@ const CELLS: &[u32] = &[6, 10, 16, 26, 42, 68, 110];
 const FEW_CELLS: &[u32] = &[10, 26, 68];
 /// A mesh with fewer triangles is not measured at several resolutions.
 const LEAST_TRIANGLES: usize = 2_000;
-const SECONDS: f64 = 16.0;
+const SECONDS: f64 = 9.0;
 const RESOLUTION: &str = "cells along the longest side";
 
 /// Measures it.
@@ -58,6 +58,7 @@ fn study() -> Study {
                 across: Quantity::Count("triangles".into()),
                 up: Quantity::Error,
                 joined: true,
+                front: true,
                 ..Plot::default()
             },
         ],
@@ -97,7 +98,8 @@ fn of_scene(
         for &shading in Shading::ALL {
             let world = subject.open(conditions.aspect())?;
             let options = FrameOptions { shading: Some(shading), shadows: false, ..FrameOptions::default() };
-            frames.push(Frame::new(world, options).sharing(shading.name()));
+            let frame = Frame::new(world, options).sharing(shading.name());
+            frames.push(frame.counting_lights(!conditions.quick));
         }
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [part(0.1), after])?;
@@ -129,12 +131,7 @@ fn point(
         parameters: cells.map(|cells| (RESOLUTION.to_owned(), f64::from(cells))).into_iter().collect(),
         milliseconds: frame.spread(),
         counts: frame.counts(),
-        command: format!(
-            "lumbre render {} -o frame.exr --shading {} --no-shadows --size {} --frames 20 --timings times.json",
-            subject.in_commands(),
-            shading.name(),
-            conditions.size_text()
-        ),
+        command: conditions.drawing(subject.in_commands(), &format!(" --shading {shading} --no-shadows")),
         ..Point::default()
     }
 }

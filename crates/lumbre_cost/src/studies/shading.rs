@@ -1,7 +1,7 @@
 //! Flat, Gouraud and Phong shading over meshes from coarse to fine, against the exact surface: which of them reaches which error in the least
 //! time.
 
-use lumbre_optics::{ReflectionModel, Shading};
+use lumbre_optics::{Lobe, ReflectionModel, Shading};
 use lumbre_render::FrameOptions;
 
 use crate::findings::{cheapest_by_error, is_above_one, percent, ratio_of, rounded};
@@ -17,7 +17,7 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 /// Depths of the spheres.
 const DEPTHS: std::ops::RangeInclusive<u32> = 0..=7;
 /// Seconds for the frames of a full report.
-const SECONDS: f64 = 24.0;
+const SECONDS: f64 = 14.0;
 const DEPTH: &str = "depth of subdivision";
 
 /// Measures it.
@@ -33,7 +33,8 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         for &shading in Shading::ALL {
             let world = subject.scene.open(conditions.aspect())?;
             let options = FrameOptions { shading: Some(shading), shadows: false, ..FrameOptions::default() };
-            frames.push(Frame::new(world, options).sharing(shading.name()));
+            let frame = Frame::new(world, options).sharing(shading.name());
+            frames.push(frame.counting_lights(!conditions.quick));
         }
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [0.1, 1.0])?;
@@ -69,7 +70,7 @@ fn spheres(conditions: &Conditions<'_>) -> Result<Vec<Subject>, CostError> {
 }
 
 fn shiny(depth: u32) -> Ball {
-    Ball { depth, shininess: 40.0, reflection: ReflectionModel::Phong }
+    Ball { depth, shininess: 40.0, reflection: ReflectionModel::Phong, lobe: Lobe::Bare }
 }
 
 fn given(conditions: &Conditions<'_>) -> Result<Vec<Subject>, CostError> {
@@ -114,6 +115,7 @@ fn study(whole: bool) -> Study {
             across: Quantity::Count("triangles".into()),
             up: Quantity::Error,
             joined: true,
+            front: true,
             ..Plot::default()
         });
     }
@@ -138,12 +140,8 @@ pub(super) fn series_of(shading: Shading) -> &'static str {
 }
 
 fn point(conditions: &Conditions<'_>, subject: &Subject, shading: Shading, frame: &DrawnFrame) -> Point {
-    let name = shading.name();
-    let command = format!(
-        "lumbre render {} -o frame.exr --shading {name} --no-shadows --size {} --frames 20 --timings times.json",
-        subject.scene.in_commands(),
-        conditions.size_text()
-    );
+    let asked = format!(" --shading {shading} --no-shadows");
+    let command = conditions.drawing(subject.scene.in_commands(), &asked);
     Point {
         series: series_of(shading).into(),
         label: subject.label.clone(),

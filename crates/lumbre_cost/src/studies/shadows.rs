@@ -7,7 +7,7 @@ use lumbre_scene::{FrameSettings, SceneSettings, ShadowFilter};
 use lumbre_trace::TraceOptions;
 
 use super::over_scenes_made;
-use crate::findings::{cheapest_by_error, is_above_one, percent, ratio_of, rounded, short};
+use crate::findings::{cheapest_by_error, factor, percent, ratio_of, short};
 use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames};
 use crate::lamps_in_pieces::take_to_pieces;
@@ -20,12 +20,14 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 /// Texels beside the usual number, along a side of a map.
 const RESOLUTIONS: &[f32] = &[0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 const FEW_RESOLUTIONS: &[f32] = &[0.25, 1.0, 4.0];
-const RESOLUTION: &str = "texels of the maps beside the usual number, along a side";
+/// Of maps that are drawn anew.
+const FEW_ANEW: &[f32] = &[1.0, 4.0];
+const RESOLUTION: &str = "texels a side, times the usual number";
 const WITHOUT: &str = "no shadows";
 const ANEW: &str = "soft, all maps drawn anew";
 /// Lamps without a size that stand for those with one, of all of them together: their shadows end in steps of one of them.
 const PIECES: u32 = 256;
-const SECONDS: f64 = 16.0;
+const SECONDS: f64 = 9.0;
 /// Of a file whose lamps ask for no shadows, so many do for the study.
 const MADE_TO_ASK: usize = 3;
 
@@ -60,6 +62,7 @@ fn study() -> Study {
                 up: Quantity::Error,
                 series: ShadowFilter::ALL.iter().map(|filter| filter.name().to_owned()).collect(),
                 joined: true,
+                front: true,
                 ..Plot::default()
             },
         ],
@@ -86,7 +89,7 @@ fn asked(conditions: &Conditions<'_>) -> Vec<Asked> {
             all.push(Asked { settings, ..usual });
         }
     }
-    for &shadow_resolution in resolutions {
+    for &shadow_resolution in conditions.unless_quick(RESOLUTIONS, FEW_ANEW) {
         let settings = FrameSettings { shadow_resolution, ..usual.settings };
         all.push(Asked { settings, moving: true, ..usual });
     }
@@ -192,12 +195,8 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, asked: &Asked, frame: &
         milliseconds: frame.spread(),
         counts: frame.counts(),
         command: match asked.moving {
-            true => "lumbre cost -o again --study shadows".to_owned(),
-            false => format!(
-                "lumbre render {} -o frame.exr {arguments} --size {} --frames 20 --timings times.json",
-                scene.in_commands(),
-                conditions.size_text()
-            ),
+            true => conditions.again("shadows"),
+            false => conditions.drawing(scene.in_commands(), &format!(" {arguments}")),
         },
         ..Point::default()
     }
@@ -225,16 +224,10 @@ fn findings(scene: &str, all: &[Asked], points: &[Point], drawn: &[DrawnFrame]) 
         for filter in [ShadowFilter::PercentageCloser, ShadowFilter::Hard] {
             let Some(other) = usual(filter, 1.0, false) else { continue };
             let Some(ratio) = ratio_of(&drawn[other].times, &drawn[soft].times) else { continue };
-            let decided = match is_above_one(&ratio) {
-                Some(_) => "",
-                None => ", which is not told apart from 1",
-            };
             findings.push(format!(
-                "Read as {} a frame takes {} of the time of soft shadows ({} to {}){decided}, and is off by {}.",
+                "Read as {} a frame takes {} of the time of soft shadows, and is off by {}.",
                 filter.name(),
-                rounded(ratio.median),
-                rounded(ratio.lower),
-                rounded(ratio.upper),
+                factor(&ratio),
                 percent(error(other))
             ));
         }
@@ -249,13 +242,7 @@ fn findings(scene: &str, all: &[Asked], points: &[Point], drawn: &[DrawnFrame]) 
             let resolution = asked.settings.shadow_resolution;
             let kept = usual(ShadowFilter::Soft, resolution, false)?;
             let ratio = ratio_of(&drawn[place].times, &drawn[kept].times)?;
-            Some(format!(
-                "{} ({} to {}) at resolution {}",
-                rounded(ratio.median),
-                rounded(ratio.lower),
-                rounded(ratio.upper),
-                short(f64::from(resolution))
-            ))
+            Some(format!("{} at resolution {}", factor(&ratio), short(f64::from(resolution))))
         })
         .collect();
     if !told.is_empty() {

@@ -8,6 +8,7 @@ use lumbre_scene::{Camera, Name};
 use lumbre_trace::TraceOptions;
 
 use super::over_scenes_made;
+use crate::command_line::quoted;
 use crate::findings::{milliseconds, percent};
 use crate::frame::Frame;
 use crate::frames::draw_frames;
@@ -19,14 +20,14 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 
 /// Cameras of a file that are looked through, at most.
 const STOPS: usize = 16;
-const FEW_STOPS: usize = 2;
+const FEW_STOPS: usize = 1;
 /// For the frames of one camera.
-const SECONDS: f64 = 6.0;
+const SECONDS: f64 = 4.0;
 
 /// A frame as it is, with more, or with less.
 struct Change {
     name: &'static str,
-    /// On the command line, where there is such an option.
+    /// How it is asked for on the command line.
     arguments: &'static str,
     apply: fn(&mut World, &mut FrameOptions),
 }
@@ -42,7 +43,11 @@ const CHANGES: &[Change] = &[
         arguments: " --shading phong",
         apply: |_, options| options.shading = Some(Shading::Phong),
     },
-    Change { name: "a shadow of every lamp", arguments: "", apply: |world, _| every_lamp_casts(world) },
+    Change {
+        name: "a shadow of every lamp",
+        arguments: " --every-shadow",
+        apply: |world, _| every_lamp_casts(world),
+    },
     Change {
         name: "mirrors four deep",
         arguments: " --mirror-depth 4",
@@ -50,7 +55,7 @@ const CHANGES: &[Change] = &[
     },
     Change {
         name: EVERYTHING,
-        arguments: "",
+        arguments: " --every-shadow --shading phong --mirror-depth 4",
         apply: |world, options| {
             every_lamp_casts(world);
             (options.shading, options.mirror_depth) = (Some(Shading::Phong), 4);
@@ -89,6 +94,7 @@ fn study() -> Study {
             title: "Error against time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
+            front: true,
             ..Plot::default()
         }],
         ..Study::default()
@@ -120,7 +126,7 @@ fn of_scene(
     let most = conditions.unless_quick(STOPS, FEW_STOPS).min(stops.len());
     if most < stops.len() {
         measured.study.notes.push(format!(
-            "{} has {} cameras; the first {most} were looked through.",
+            "{} has {} cameras, of which the first {most} stand here.",
             scene.name,
             stops.len()
         ));
@@ -137,10 +143,10 @@ fn of_scene(
     }
     let most_often = (1..CHANGES.len()).max_by_key(|change| best[*change]).filter(|change| best[*change] > 0);
     if let Some(change) = most_often {
-        measured
-            .study
-            .findings
-            .push(format!("Of {most} cameras {} would gain most by {}.", best[change], CHANGES[change].name));
+        measured.study.findings.push(format!(
+            "{} of the cameras looked through ({most}) would gain most by {}.",
+            best[change], CHANGES[change].name
+        ));
     }
     Ok(())
 }
@@ -177,12 +183,8 @@ fn of_camera(
             label: change.name.to_owned(),
             milliseconds: frame.spread(),
             counts: frame.counts(),
-            command: format!(
-                "lumbre render {} -o frame.exr --camera \"{stop}\"{} --size {} --frames 20 --timings times.json",
-                scene.in_commands(),
-                change.arguments,
-                conditions.size_text()
-            ),
+            command: conditions
+                .drawing(scene.in_commands(), &format!(" --camera {}{}", quoted(stop), change.arguments)),
             ..Point::default()
         };
         measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;

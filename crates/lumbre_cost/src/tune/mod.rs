@@ -87,6 +87,8 @@ pub fn tune(
         quick: options.quick,
         counts_only: false,
         size: options.size,
+        size_of_report: options.size,
+        as_shown: true,
         seed: 0,
         folder: report.unwrap_or(Path::new(".")),
         files: &files,

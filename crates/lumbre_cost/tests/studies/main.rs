@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
+mod changed;
 mod counts;
+mod kept_pictures;
 mod live;
 mod planted;
 mod shadows;
@@ -13,16 +15,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use bevy_ecs::world::World;
+use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_cost::{
-    CostError, CostOptions, CostReport, ErrorOver, PAGE, Picture, Point, TABLE, measure, read_picture,
-    read_report, studies_named,
+    CostError, CostOptions, CostReport, PAGE, Point, REPORT, TABLE, measure, read_report, studies_named,
 };
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_render::Gpu;
-use lumbre_scene::{Camera, Mesh, Name, StaticObject, Transform, save};
+use lumbre_scene::{Camera, DynamicObject, Mesh, Name, StaticObject, Transform, save};
 
 fn options(studies: &[&str], files: Vec<PathBuf>) -> CostOptions {
     let names: Vec<String> = studies.iter().map(|name| (*name).to_owned()).collect();
@@ -162,46 +163,42 @@ fn lightmaps_beat_ambient_light_and_a_far_room_is_not_baked_again() {
     assert!(study.findings.len() == 3 && study.notes.is_empty(), "{:?} {:?}", study.findings, study.notes);
 }
 
-/// Root mean square difference over that of the reference, by the plain formula.
-fn relative_rmse(reference: &Picture, picture: &Picture, over: ErrorOver) -> f64 {
-    let (mut squares, mut size) = (0.0, 0.0);
-    for (wanted, found) in reference.radiance.iter().zip(&picture.radiance) {
-        if over == ErrorOver::WhereBothAreLit && (*wanted == DVec3::ZERO || *found == DVec3::ZERO) {
-            continue;
+#[test]
+fn a_file_with_nothing_to_bake_is_said_to_have_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let dark = |is_static: bool| {
+        let mut world = two_rooms();
+        let objects: Vec<_> = world.query_filtered::<Entity, With<StaticObject>>().iter(&world).collect();
+        world.query::<&mut Light>().iter_mut(&mut world).for_each(|mut light| light.bake = BakeMode::Dynamic);
+        if !is_static {
+            for object in objects {
+                world.entity_mut(object).remove::<StaticObject>().insert(DynamicObject);
+            }
         }
-        for channel in 0..3 {
-            squares += (wanted[channel] - found[channel]).powi(2);
-            size += wanted[channel].powi(2);
+        world
+    };
+    for (name, is_static, why) in [
+        ("lamps.glb", true, "has no light that is baked"),
+        ("moving.glb", false, "Nothing of moving is static"),
+    ] {
+        let path = saved(folder.path(), name, dark(is_static));
+        let asked = options(&["bake", "preprocessing", "lightmaps", "transport"], vec![path]);
+        let report = measured(&asked, &folder.path().join("report"));
+        for study in &report.studies {
+            assert!(study.notes.iter().any(|note| note.contains(why)), "{}: {:?}", study.name, study.notes);
+            // Paths and lamps want no bake; of all else nothing can be said.
+            let is_empty = study.points.is_empty() && study.findings.is_empty();
+            assert_eq!(is_empty, study.name != "transport", "{}: {:?}", study.name, study.findings);
+            assert!(!study.points.iter().any(|point| point.label.contains("lightmaps")), "{}", study.name);
         }
     }
-    if squares == 0.0 { 0.0 } else { (squares / size).sqrt() }
 }
 
 #[test]
-fn errors_are_those_of_the_pictures_that_are_kept_and_a_report_goes_on() {
+fn a_report_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let asked = options(&["shading", "reflection"], Vec::new());
     let report = measured(&asked, folder.path());
-    let mut compared = 0;
-    for point in report.studies.iter().flat_map(|study| &study.points) {
-        let (files, error) = (point.picture.as_ref().unwrap(), point.error.unwrap());
-        let [picture, reference] =
-            [&files.picture, &files.reference].map(|name| read_picture(folder.path(), name).unwrap());
-        let again = relative_rmse(&reference, &picture, files.error_of);
-        // The reference is rounded to f32 in its file.
-        let bound = 1e-6 * error.relative_rmse + 1e-7;
-        assert!(
-            (again - error.relative_rmse).abs() < bound,
-            "{}, {}: {again} {error:?}",
-            point.series,
-            point.label
-        );
-        for kind in ["png", "heat.png"] {
-            assert!(folder.path().join(format!("{}.{kind}", files.picture)).exists());
-        }
-        compared += usize::from(error.relative_rmse > 0.0);
-    }
-    assert!(compared > 20, "only {compared} pictures differ from their reference");
 
     // Finer meshes are nearer, in every shading.
     let shading = report.study("shading").unwrap();
@@ -223,9 +220,33 @@ fn errors_are_those_of_the_pictures_that_are_kept_and_a_report_goes_on() {
     assert_eq!(more.studies[..2], report.studies[..]);
     assert_eq!(more.studies.len(), 3);
     assert_eq!(read_report(folder.path()).unwrap(), more);
+    // What is not asked for this time is kept, in its place on the page.
+    let one = CostOptions { studies: studies_named(&["precision".into()]).unwrap(), ..again.clone() };
+    assert_eq!(measured(&one, folder.path()), more);
+    // What another method or another program has measured is measured anew, and only that.
+    let altered = |alter: &dyn Fn(&mut CostReport)| {
+        let mut old = more.clone();
+        alter(&mut old);
+        std::fs::write(folder.path().join(REPORT), serde_json::to_string(&old).unwrap()).unwrap();
+        let found = measured(&one, folder.path());
+        assert_eq!(found.studies.len(), 3);
+        assert_eq!(
+            (&found.studies[0].name, &found.studies[1].name),
+            (&old.studies[0].name, &old.studies[1].name)
+        );
+        assert_eq!(
+            (&found.studies[2].method, &found.studies[2].version),
+            (&more.studies[2].method, &more.studies[2].version)
+        );
+        found.studies[2].seconds == more.studies[2].seconds
+    };
+    assert!(altered(&|_| {}), "nothing has changed");
+    assert!(!altered(&|old| old.studies[2].method += 1));
+    assert!(!altered(&|old| old.studies[2].version = "another program".into()));
     // With other settings nothing is kept.
     let other = CostOptions { seed: 2, studies: studies_named(&["reflection".into()]).unwrap(), ..again };
     let measured_again = measured(&other, folder.path());
+    assert_eq!(measured_again.studies.len(), 1);
     assert_ne!(measured_again.studies[0].seconds, report.studies[1].seconds);
 }
 

@@ -1,0 +1,79 @@
+//! The errors of a report, worked out again from the pictures that it keeps, by the plain formula: of every study and every point that has a picture.
+
+use glam::DVec3;
+use lumbre_cost::{CostOptions, ErrorOver, Picture, STUDIES, read_picture};
+
+use super::{measured, options};
+
+/// Root mean square difference over that of the reference, and the largest difference of a channel.
+fn errors(reference: &Picture, picture: &Picture, over: ErrorOver) -> [f64; 2] {
+    let (mut squares, mut size, mut largest) = (0.0, 0.0, 0.0_f64);
+    for (wanted, found) in reference.radiance.iter().zip(&picture.radiance) {
+        if over == ErrorOver::WhereBothAreLit && (*wanted == DVec3::ZERO || *found == DVec3::ZERO) {
+            continue;
+        }
+        for channel in 0..3 {
+            squares += (wanted[channel] - found[channel]).powi(2);
+            size += wanted[channel].powi(2);
+            largest = largest.max((wanted[channel] - found[channel]).abs());
+        }
+    }
+    [if squares == 0.0 { 0.0 } else { (squares / size).sqrt() }, largest]
+}
+
+/// Of lightmaps, as bakes state it: root mean square and largest difference over the mean of the reference, where both have a texel.
+fn errors_of_maps(reference: &Picture, found: &Picture) -> [f64; 2] {
+    let (mut squares, mut sum, mut largest, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
+    for (wanted, found) in reference.radiance.iter().zip(&found.radiance) {
+        if !(wanted.is_finite() && found.is_finite()) {
+            continue;
+        }
+        squares += (*wanted - *found).length_squared() / 3.0;
+        sum += wanted.element_sum() / 3.0;
+        largest = largest.max((*wanted - *found).abs().max_element());
+        count += 1.0;
+    }
+    let mean = sum / count;
+    [(squares / count).sqrt() / mean, largest / mean]
+}
+
+#[test]
+fn errors_are_those_of_the_pictures_that_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let names: Vec<&str> = STUDIES.iter().map(|study| study.name).collect();
+    let asked = CostOptions { size: (48, 32), ..options(&names, Vec::new()) };
+    let report = measured(&asked, folder.path());
+    assert_eq!(report.studies.len(), STUDIES.len());
+    for study in &report.studies {
+        let (mut compared, mut different) = (0, 0);
+        for point in study.points.iter().filter(|point| point.error.is_some()) {
+            let name = format!("{}, {}, {}", study.name, point.series, point.label);
+            let error = point.error.unwrap();
+            let files =
+                point.picture.as_ref().unwrap_or_else(|| panic!("{name} has an error and no picture of it"));
+            let read = |name: &String| read_picture(folder.path(), name).unwrap();
+            let ([found, largest], noise) = match (&files.maps, files.error_of) {
+                (Some(maps), ErrorOver::Beyond) => {
+                    // What the reference's own noise makes of it was taken off, and is known to a fifth.
+                    (errors_of_maps(&read(&maps.reference), &read(&maps.picture)), 5.0 * error.uncertainty)
+                }
+                (None, over) => (errors(&read(&files.reference), &read(&files.picture), over), 0.0),
+                other => panic!("{name}: {other:?}"),
+            };
+            // What is kept is rounded to f32.
+            let bound = 1e-6 * found + 1e-7;
+            assert!(found - error.relative_rmse > -bound, "{name}: {found} {error:?}");
+            assert!(found - error.relative_rmse < bound + noise, "{name}: {found} {error:?}");
+            assert!(
+                (largest - error.largest).abs() <= 1e-6 * largest + 1e-7 * found.max(1.0),
+                "{name}: {largest} {error:?}"
+            );
+            for kind in ["png", "heat.png"] {
+                assert!(folder.path().join(format!("{}.{kind}", files.picture)).exists(), "{name}");
+            }
+            compared += 1;
+            different += usize::from(found > 0.0);
+        }
+        assert!(compared >= 4 && different >= compared / 2, "{}: {different} of {compared}", study.name);
+    }
+}
