@@ -27,7 +27,8 @@
 //! their error, and `finish::seams` adds by how much a texel was moved.
 //!
 //! A cautious figure is stated for a single texel, the expected one for the whole map: the cautious figures of many
-//! texels add up to far more than the map's error. The tests `honest_error` compare both with converged bakes.
+//! texels add up to far more than the map's error. The tests `honest_error` compare both with converged bakes, and
+//! `coverage` compares the former with the tests' path tracer in scenes that no constant was chosen on.
 //!
 //! Not included: the map's own resolution, and penumbrae that all samples of a texel and of its neighbours missed.
 

@@ -100,15 +100,18 @@ fn texels(world: &mut World) -> Vec<Texel> {
     found
 }
 
-/// Returns true if a place is in the open, and not inside something that stands on its surface. Rays that leave it at a
-/// slant must not meet the back of a face: along the normal they could meet the floor in whose plane the thing ends.
+/// By how much a place is lifted off its surface before it is asked whether it is in the open, metres. Corners of meshes
+/// are rounded to f32, so that things that stand on a surface may leave a crack of some ten nanometres.
+const LIFT: f64 = 1e-4;
+
+/// Returns true if a place is in the open, and not inside something that stands on its surface: then rays meet the back
+/// of a face. They leave at a slant, as along the normal they could meet the floor in whose plane the thing ends.
 fn is_open(tracer: &PathTracer, place: DVec3, normal: DVec3) -> bool {
-    let origin = place + normal * tracer.offset;
     [DVec3::new(0.31, 0.74, 0.23), DVec3::new(-0.52, 0.11, 0.67), DVec3::new(0.09, -0.63, -0.41)]
         .into_iter()
         .map(|slant| (normal + 0.9 * slant).normalize())
         .all(|direction| {
-            let hit = tracer.scene.closest(origin, direction);
+            let hit = tracer.scene.closest(place + normal * LIFT, direction);
             hit.is_none_or(|hit| tracer.scene.triangles[hit.triangle].normal.dot(direction) < 0.0)
         })
 }

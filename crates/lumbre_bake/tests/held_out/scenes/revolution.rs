@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::{DVec3, Vec2};
 use lumbre_mesh::TriangleMesh;
 
-/// Builds the surface from a profile, which gives the radius and the height for a parameter from 0 (the lower end) to
-/// 1. An end with a radius of 0 is closed. The mesh has 2 · segments · rings triangles, minus `segments` for each
+/// Builds the surface from a profile, which gives the radius and the height for a parameter between 0 (the lower end)
+/// and 1 (the upper). An end with a radius of 0 is closed. The mesh has 2 · segments · rings triangles, minus `segments` for each
 /// closed end. It faces outwards where the height grows.
 pub fn revolution(profile: impl Fn(f64) -> [f64; 2], segments: u32, rings: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
