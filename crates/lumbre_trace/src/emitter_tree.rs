@@ -39,6 +39,8 @@ struct Node {
     radius: f64,
     power: f64,
     cone: NormalCone,
+    /// Half the opening angle of the cone.
+    cone_angle: Angle,
     two_sided: bool,
     parent: Option<u32>,
     contents: Contents,
@@ -133,6 +135,7 @@ impl EmitterTree {
             radius: 0.5 * (bounds.high - bounds.low).length(),
             power: bounds.power,
             cone: bounds.cone,
+            cone_angle: Angle { cosine: bounds.cone.angle.cos(), sine: bounds.cone.angle.sin() },
             two_sided: bounds.two_sided,
             parent: None,
             contents,
@@ -152,16 +155,46 @@ impl Node {
         }
         let direction = to / distance;
         // Directions to the triangles differ from that to the centre by at most this angle.
-        let spread = (self.radius / distance).clamp(0.0, 1.0).asin();
-        let angle = |cosine: f64| cosine.clamp(-1.0, 1.0).acos();
+        let spread = Angle::from_sine(self.radius / distance);
         let emitted = -direction.dot(self.cone.axis);
-        let emitted = angle(if self.two_sided { emitted.abs() } else { emitted });
-        let emitted = (emitted - self.cone.angle - spread).max(0.0);
-        let received = (angle(direction.dot(normal)) - spread).max(0.0);
-        if emitted >= FRAC_PI_2 || received >= FRAC_PI_2 {
+        let emitted = Angle::from_cosine(if self.two_sided { emitted.abs() } else { emitted });
+        let emitted = emitted.minus(self.cone_angle).minus(spread);
+        let received = Angle::from_cosine(direction.dot(normal)).minus(spread);
+        if emitted.cosine <= 0.0 || received.cosine <= 0.0 {
             return 0.0;
         }
-        self.power * emitted.cos() * received.cos() / distance_squared
+        self.power * emitted.cosine * received.cosine / distance_squared
+    }
+}
+
+/// An angle in [0, π] by its cosine and sine, as no trigonometric function is cheap enough for every node.
+#[derive(Clone, Copy, Debug)]
+struct Angle {
+    cosine: f64,
+    sine: f64,
+}
+
+impl Angle {
+    fn from_cosine(cosine: f64) -> Self {
+        let cosine = cosine.clamp(-1.0, 1.0);
+        Self { cosine, sine: ((1.0 - cosine) * (1.0 + cosine)).sqrt() }
+    }
+
+    /// An acute angle.
+    fn from_sine(sine: f64) -> Self {
+        let sine = sine.clamp(0.0, 1.0);
+        Self { cosine: ((1.0 - sine) * (1.0 + sine)).sqrt(), sine }
+    }
+
+    /// The difference, or 0 where the other angle is larger.
+    fn minus(self, other: Self) -> Self {
+        if self.cosine > other.cosine {
+            return Self { cosine: 1.0, sine: 0.0 };
+        }
+        Self {
+            cosine: self.cosine * other.cosine + self.sine * other.sine,
+            sine: self.sine * other.cosine - self.cosine * other.sine,
+        }
     }
 }
 

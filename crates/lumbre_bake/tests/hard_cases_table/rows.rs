@@ -40,7 +40,7 @@ pub const ROWS: [(&str, &str); 13] = [
     ),
     (
         "overlapping or out-of-range UVs; texels with no coverage; charts under a texel",
-        "The mesh is named and unwrapped anew; coverage is conservative, values are continued into the gap. Also [validation](../crates/lumbre_mesh/src/uv_validation.rs) `every_fault_names_its_triangles`, [atlas](../crates/lumbre_mesh/tests/atlas.rs) `no_overlap`, `the_check_sees_a_gap_that_is_too_small`, [unwrap](../crates/lumbre_mesh/tests/unwrap.rs) `triangles_without_area_share_a_spot`, [sizes](../crates/lumbre_bake/tests/bake/hard_cases_of_size.rs) `coordinates_out_of_range_and_overlapping_are_named_and_replaced`, `charts_below_a_texel_have_light`, and [filling](../crates/lumbre_bake/src/probes/fill.rs) `a_plane_is_continued_exactly_and_moved_to_the_centres`.",
+        "The mesh is named and unwrapped anew; coverage is conservative, values are continued into the gap. Also [validation](../crates/lumbre_mesh/src/uv_validation.rs) `every_fault_names_its_triangles`, [atlas](../crates/lumbre_mesh/tests/atlas.rs) `no_overlap`, `the_check_sees_a_gap_that_is_too_small`, [unwrap](../crates/lumbre_mesh/tests/unwrap.rs) `triangles_without_area_share_a_spot`, [sizes](../crates/lumbre_bake/tests/bake/hard_cases_of_size.rs) `coordinates_out_of_range_and_overlapping_are_named_and_replaced`, `charts_below_a_texel_have_light`, and [filling](../crates/lumbre_bake/src/finish/fill.rs) `a_plane_is_continued_exactly_and_moved_to_the_centres`.",
     ),
     (
         "sums over 10^8 samples, light ratios of 10^8; RGB9E5 saturates at 65408",
