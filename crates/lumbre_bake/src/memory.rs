@@ -119,7 +119,7 @@ pub(crate) fn resolution(
     report: &mut BakeReport,
 ) -> Result<Resolution, BakeError> {
     let effort = options.effort();
-    let CoveredTexels { layout, list: texels, side: texel_side, .. } = texels;
+    let CoveredTexels { layout, list: texels, contacts, side: texel_side, .. } = texels;
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let mut resolution = Resolution { patch_side: side, form_factor_rays: effort.form_factor_rays };
@@ -131,6 +131,7 @@ pub(crate) fn resolution(
     });
     let texel_bytes = covered * (COVERED_TEXEL_BYTES + sample_bytes)
         + footprint_points.sum::<u64>() * size_of::<FootprintPoint>() as u64
+        + contacts.bytes()
         + map_bytes(layout, options);
     let requested_patches = Patches::count(scene, side);
     let (mut patches, mut is_coarsest) = (requested_patches, false);

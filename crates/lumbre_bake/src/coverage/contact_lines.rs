@@ -22,6 +22,11 @@ impl ContactLines {
         Self(lines)
     }
 
+    /// Bytes that the lines take.
+    pub fn bytes(&self) -> u64 {
+        size_of_val(&self.0[..]) as u64
+    }
+
     /// Returns true if a line crosses the segment between two places of a map, in texels.
     pub fn separate(&self, map: &MapLayout, [from, to]: [Vec2; 2]) -> bool {
         let (low, high) = (from.min(to).max(Vec2::ZERO).as_uvec2(), from.max(to).max(Vec2::ZERO).as_uvec2());
