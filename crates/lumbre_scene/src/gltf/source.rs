@@ -10,6 +10,7 @@ use super::compressed::Decoded;
 use super::document::{self, Document};
 use super::error::{LoadError, LoadProblem, Notes};
 use super::import::{LoadReport, check_extensions, contents, decode, spawn};
+use super::limits::Budget;
 use super::options::LoadOptions;
 use super::patch::{Former, Patch, take_back};
 use super::uri::{self, Base};
@@ -33,7 +34,8 @@ pub struct SourceFile {
     /// The entity of each node; empty until the file is loaded into a World.
     pub(crate) nodes: Vec<Entity>,
     name: String,
-    file_bytes: u64,
+    /// What decompression and instances have left of the limit on decoded bytes.
+    budget: Budget,
     notes: Notes,
     options: LoadOptions,
 }
@@ -79,7 +81,7 @@ impl SourceFile {
         let contents = buffers.bytes.into_iter().map(Cow::into_owned).collect();
         let document = if expanded { Document::from_root(patch.root(), &mut notes)? } else { document };
         let chunks = container.others.into_iter().map(|(kind, bytes)| (kind, bytes.to_vec())).collect();
-        let (name, file_bytes) = (name.to_owned(), bytes.len() as u64);
+        let name = name.to_owned();
         let (nodes, options) = (Vec::new(), options.clone());
         Ok(Self {
             patch,
@@ -90,7 +92,7 @@ impl SourceFile {
             folder,
             nodes,
             name,
-            file_bytes,
+            budget,
             notes,
             options,
         })
@@ -104,7 +106,8 @@ impl SourceFile {
     pub fn load_into(&mut self, world: &mut World) -> Result<LoadReport, LoadError> {
         let mut notes = std::mem::take(&mut self.notes);
         let limits = self.options.limits;
-        let prepared = decode(&self.buffers(), self.file_bytes, self.base(), limits, &mut notes)
+        let budget = self.budget.clone();
+        let prepared = decode(&self.buffers(), budget, self.base(), limits, &mut notes)
             .map_err(|problem| LoadError { file: self.name.clone(), problem: problem.into() })?;
         let report = spawn(world, prepared, notes);
         self.nodes.clone_from(&report.nodes);
