@@ -66,7 +66,9 @@ pub enum QuadricError {
     },
     /// The coefficients of a general quadric define no surface: a to i are all 0, or one of a to j is NaN or
     /// beyond [`Quadric::MAX_VALUE`].
-    #[error("coefficients a to i are all 0, or one of a to j is not a number up to 1e100; give an equation that has points")]
+    #[error(
+        "coefficients a to i are all 0, or one of a to j is not a number up to 1e100; give an equation that has points"
+    )]
     NoSurface,
     /// The trim box is empty.
     #[error("the trim's min is not below its max; give min and max of a box")]

@@ -83,19 +83,7 @@ impl SourceFile {
         let chunks = container.others.into_iter().map(|(kind, bytes)| (kind, bytes.to_vec())).collect();
         let name = name.to_owned();
         let (nodes, options) = (Vec::new(), options.clone());
-        Ok(Self {
-            patch,
-            document,
-            contents,
-            chunks,
-            decoded,
-            folder,
-            nodes,
-            name,
-            budget,
-            notes,
-            options,
-        })
+        Ok(Self { patch, document, contents, chunks, decoded, folder, nodes, name, budget, notes, options })
     }
 
     /// Spawns its entities in a World, as [`load`](super::load()) does, and remembers them for
