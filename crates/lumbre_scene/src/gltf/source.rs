@@ -12,7 +12,7 @@ use super::error::{LoadError, LoadProblem, Notes};
 use super::import::{LoadReport, check_extensions, contents, decode, spawn};
 use super::limits::Budget;
 use super::options::LoadOptions;
-use super::patch::{Former, Patch, take_back};
+use super::patch::{EarlierBake, Patch, undo_bake};
 use super::uri::{self, Base};
 use super::{compressed, container, instancing};
 
@@ -57,10 +57,10 @@ impl SourceFile {
         let mut notes = Notes { lenient: options.lenient, ..Notes::default() };
         let container = container::split(&bytes, &mut notes)?;
         let mut root = document::parse(container.json)?;
-        match take_back(&mut root) {
-            Former::None => {}
-            Former::TakenBack => notes.add("LUMBRE_bake", "was baked before; begins as it was then"),
-            Former::Changed => notes.add(
+        match undo_bake(&mut root) {
+            EarlierBake::None => {}
+            EarlierBake::Undone => notes.add("LUMBRE_bake", "was baked before; begins as it was then"),
+            EarlierBake::Modified => notes.add(
                 "LUMBRE_bake",
                 "was changed by another program after a bake; what that bake added is taken for the artist's",
             ),
