@@ -1,4 +1,4 @@
-//! Highlights that keep their energy: the specular term of glTF's metallic-roughness materials (glTF 2.0, appendix
+//! Energy-conserving highlights: the specular term of glTF's metallic-roughness materials (glTF 2.0, appendix
 //! B.3), and the lobes of Phong and Blinn with the same brightness. In the documents' highlights, which are bare
 //! powers of a cosine, k_s is the brightness at the peak; here it is the fraction of the light that a surface
 //! reflects when it is lit along its normal.

@@ -119,7 +119,7 @@ fn everything() -> World {
             mirror: Vec3::splat(0.1),
             transmission: Vec3::new(0.0, 0.2, 0.0),
             ior: 1.33,
-            lobe: lumbre_optics::Lobe::EnergyKeeping,
+            lobe: lumbre_optics::Lobe::EnergyConserving,
             distribution: Distribution::Gaussian,
             fresnel: Fresnel::Conductor {
                 eta: Vec3::new(0.17, 0.42, 1.38),

@@ -20,9 +20,9 @@ const EXPONENT: &str = "exponent";
 /// one.
 fn variants() -> Vec<Variant> {
     let bare = |&model| Variant { model, lobe: Lobe::Bare };
-    let keeping = Variant { model: ReflectionModel::Blinn, lobe: Lobe::EnergyKeeping };
+    let conserving = Variant { model: ReflectionModel::Blinn, lobe: Lobe::EnergyConserving };
     // Phong's is the first: all others are compared with it.
-    ReflectionModel::ALL.iter().map(bare).chain([keeping]).collect()
+    ReflectionModel::ALL.iter().map(bare).chain([conserving]).collect()
 }
 
 /// A reflection model, and how its specular coefficient is interpreted.
@@ -57,8 +57,9 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
             SceneFile::made(conditions, &name, ball(asked))
         };
         let bare = made(Lobe::Bare, format!("ball-exponent-{shininess}"))?;
-        let keeping = made(Lobe::EnergyKeeping, format!("ball-exponent-{shininess}-energy-keeping"))?;
-        let of = |variant: &Variant| if variant.lobe == Lobe::Bare { bare.clone() } else { keeping.clone() };
+        let conserving = made(Lobe::EnergyConserving, format!("ball-exponent-{shininess}-energy-keeping"))?;
+        let of =
+            |variant: &Variant| if variant.lobe == Lobe::Bare { bare.clone() } else { conserving.clone() };
         let own: Vec<SceneFile> = variants.iter().map(of).collect();
         for (variant, scene) in variants.iter().zip(&own) {
             let options = FrameOptions { reflection: Some(variant.model), ..FrameOptions::default() };
@@ -107,7 +108,7 @@ fn study() -> Study {
 
 fn name_of(variant: Variant) -> &'static str {
     match variant.model {
-        _ if variant.lobe == Lobe::EnergyKeeping => "Blinn, energy-keeping",
+        _ if variant.lobe == Lobe::EnergyConserving => "Blinn, energy-keeping",
         ReflectionModel::Phong => "Phong",
         ReflectionModel::Blinn => "Blinn, n",
         ReflectionModel::Blinn4n => "Blinn, 4n",
