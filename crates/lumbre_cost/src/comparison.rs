@@ -80,10 +80,10 @@ pub enum Figure {
 }
 
 impl Figure {
-    fn name(self) -> &'static str {
+    fn with_article(self) -> &'static str {
         match self {
-            Self::Time => "time",
-            Self::Error => "error",
+            Self::Time => "a time",
+            Self::Error => "an error",
         }
     }
 }
@@ -124,12 +124,8 @@ impl fmt::Display for Change {
             What::New => write!(f, ": is new"),
             What::Uncounted { name } => write!(f, ": {name} is no longer counted"),
             What::Counted { name } => write!(f, ": {name} is counted for the first time"),
-            What::Lost(figure) => write!(f, ": no longer has any {}", figure.name()),
-            What::Gained(figure) => write!(
-                f,
-                ": has {} for the first time",
-                if *figure == Figure::Time { "a time" } else { "an error" }
-            ),
+            What::Lost(figure) => write!(f, ": no longer has {}", figure.with_article()),
+            What::Gained(figure) => write!(f, ": has {} for the first time", figure.with_article()),
             What::Method { before, after } => {
                 write!(f, ": was measured by method {after} instead of {before}, and is not compared")
             }

@@ -214,9 +214,9 @@ fn what_shrinks_comes_or_goes_is_reported_and_fails_only_where_something_is_lost
     });
     assert_eq!(quicker, (false, false, named("5.00 ± 0.100 ms instead of 10.0 ± 0.100 ms (0.500 times)")));
     let untimed = changed(&|point| point.milliseconds = None);
-    assert_eq!(untimed, (false, false, named("has no time any more")));
+    assert_eq!(untimed, (false, false, named("no longer has a time")));
     let unjudged = changed(&|point| point.error = None);
-    assert_eq!(unjudged, (true, false, named("has no error any more")));
+    assert_eq!(unjudged, (true, false, named("no longer has an error")));
     // In the other direction, what is lost is gained.
     let mut without = before.clone();
     (without.studies[0].points[0].milliseconds, without.studies[0].points[0].error) = (None, None);
@@ -245,5 +245,5 @@ fn a_count_that_comes_from_nothing_or_goes_is_seen() {
     without.studies[0].points[0].counts.clear();
     let gone = compare_reports(&after, &without, 1.1);
     assert!(gone.len() == 1 && gone[0].is_worse(), "{gone:?}");
-    assert_eq!(gone[0].to_string(), "bake, final, a: rays is not counted any more");
+    assert_eq!(gone[0].to_string(), "bake, final, a: rays is no longer counted");
 }
