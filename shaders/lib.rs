@@ -59,7 +59,7 @@ modules!(
     "optics/attenuation",
     "optics/blinn_phong",
     "optics/emission",
-    "optics/energy_keeping",
+    "optics/energy_conserving",
     "optics/evaluate_light",
     "optics/fog",
     "optics/fresnel",

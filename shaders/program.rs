@@ -83,7 +83,7 @@ impl Program<'_> {
     }
 }
 
-/// The compiled embedded modules, by root and features that are on. A program needs the same variants again
+/// The compiled embedded modules, by root and named features. A program needs the same variants again
 /// for each renderer and device; each takes milliseconds to compile and has some tens of kilobytes.
 static COMPILED: Mutex<BTreeMap<String, Arc<str>>> = Mutex::new(BTreeMap::new());
 
@@ -93,8 +93,10 @@ static COMPILED: Mutex<BTreeMap<String, Arc<str>>> = Mutex::new(BTreeMap::new())
 /// # Errors
 /// The same as those of [`Program::to_wgsl`].
 pub fn to_wgsl(root: &str, features: &[(&str, bool)]) -> Result<Arc<str>, WeslError> {
-    let on = features.iter().filter(|(_, on)| *on).map(|(name, _)| *name);
-    let key = std::iter::once(root).chain(on).collect::<Vec<_>>().join(" ");
+    // Features that are off belong to the key too: one that is not named is an error, which the result for the
+    // same features with that one off must not hide.
+    let states = features.iter().flat_map(|(name, on)| [if *on { " +" } else { " -" }, *name]);
+    let key: String = std::iter::once(root).chain(states).collect();
     // The map is valid even if another thread panicked while it held the lock.
     let compiled = || COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(wgsl) = compiled().get(&key) {
@@ -115,4 +117,24 @@ fn compile(root: &str, features: &[(&str, bool)]) -> Result<String, WeslError> {
 fn module_path(path: &str) -> Result<wesl::syntax::ModulePath, WeslError> {
     let full = format!("package::{}", path.replace('/', "::"));
     full.parse().map_err(|error| WeslError(format!("{full}: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_feature_that_is_not_named_is_an_error_whatever_was_compiled_before() {
+        let all = ["DISPLAY_SRGB", "DISPLAY_CLAMP", "ENCODE_SRGB", "DECODE_SRGB", "VIEWPORT"];
+        let off = all.map(|name| (name, false));
+        assert!(to_wgsl("display", &off).is_ok());
+        for missing in 0..all.len() {
+            let others: Vec<_> = (0..all.len()).filter(|&at| at != missing).map(|at| off[at]).collect();
+            let found = to_wgsl("display", &others);
+            assert!(found.is_err_and(|error| error.to_string().contains(all[missing])), "{}", all[missing]);
+        }
+        let mut on = off;
+        on[4].1 = true;
+        assert_ne!(to_wgsl("display", &off).unwrap(), to_wgsl("display", &on).unwrap());
+    }
 }

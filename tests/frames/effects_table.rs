@@ -370,11 +370,11 @@ const ROWS: &[Row] = &[
         add: |scene| material(scene, |material| material.fresnel = Fresnel::NormalReflectance),
     },
     Row {
-        effect: "highlights that keep their energy",
-        called_for_by: "`Lobe::EnergyKeeping` of the material, as glTF's have it",
-        features: &["ENERGY_KEEPING"],
+        effect: "energy-conserving highlights",
+        called_for_by: "`Lobe::EnergyConserving` of the material, as glTF's have it",
+        features: &["ENERGY_CONSERVING"],
         before: glossy,
-        add: |scene| material(scene, |material| material.lobe = Lobe::EnergyKeeping),
+        add: |scene| material(scene, |material| material.lobe = Lobe::EnergyConserving),
     },
     Row {
         effect: "specular antialiasing",

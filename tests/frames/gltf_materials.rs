@@ -166,7 +166,7 @@ fn a_smooth_plastic_shows_the_lamp() {
 }
 
 #[test]
-fn energy_keeping_frames_agree_with_the_twin() {
+fn energy_conserving_frames_agree_with_the_twin() {
     for model in ReflectionModel::ALL {
         for filtered in [false, true] {
             let mut world = balls(None);

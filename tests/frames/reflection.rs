@@ -162,9 +162,9 @@ fn metallic_roughness_materials_reflect_what_gltf_says_at_normal_incidence() {
     for (name, material, expected) in
         [("plastic", plastic, DVec3::splat(0.04)), ("metal", metal, base.as_dvec3())]
     {
-        // The peak of the lobe is 1/(4 alpha^2) if it keeps its energy, and 1 for a bare lobe.
+        // The peak of the lobe is 1/(4 alpha^2) if it conserves energy, and 1 for a bare lobe.
         let alpha = 0.3f64 * 0.3;
-        for (lobe, peak) in [(Lobe::EnergyKeeping, 0.25 / (alpha * alpha)), (Lobe::Bare, 1.0)] {
+        for (lobe, peak) in [(Lobe::EnergyConserving, 0.25 / (alpha * alpha)), (Lobe::Bare, 1.0)] {
             let got = straight_on(Material { lobe, ..material.clone() });
             // Some tens of roundings in the Fresnel term, and that of 0.04 in f32.
             let apart = (got - peak * expected).abs().max_element();

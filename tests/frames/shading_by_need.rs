@@ -146,8 +146,8 @@ fn spheres_of_eight_depths_are_no_farther_from_phong_than_is_asked() {
         (None, Lobe::Bare, ReflectionModel::Phong),
         (Some(4.0), Lobe::Bare, ReflectionModel::Phong),
         (Some(40.0), Lobe::Bare, ReflectionModel::Blinn),
-        (Some(10.0), Lobe::EnergyKeeping, ReflectionModel::Blinn),
-        (Some(300.0), Lobe::EnergyKeeping, ReflectionModel::BlinnMatched),
+        (Some(10.0), Lobe::EnergyConserving, ReflectionModel::Blinn),
+        (Some(300.0), Lobe::EnergyConserving, ReflectionModel::BlinnMatched),
     ];
     let mut all = Vec::new();
     for (kind_number, kind) in KINDS.into_iter().enumerate() {

@@ -85,16 +85,16 @@ fn occlusions() -> [Twin; 1] {
         .corners(product(&[&[0.0, 0.25, 1.0], &[0.0, 0.5, 1.0]]))]
 }
 
-fn energy_keeping() -> [Twin; 4] {
+fn energy_conserving() -> [Twin; 4] {
     let alphas = [2e-6, 1e-3, 0.25, 0.5, 1.0];
     let arguments = [Type::Vector, Type::Vector, Type::Vector, Type::Number, Type::Vector];
     [
-        Twin::new("energy_keeping", "lobe_peak", &[], &[Type::Number], Type::Number)
+        Twin::new("energy_conserving", "lobe_peak", &[], &[Type::Number], Type::Number)
             .expect(|x| lobe_peak(x[0]))
             .within(|x| bound::lobe_peak(x[0]))
             .random(|s| vec![s.decades(-3.0, 6.0)])
             .corners(product(&[&[&EXPONENTS[..], &[-1.0]].concat()])),
-        Twin::new("energy_keeping", "distribution_ggx", &[], &[Type::Number; 2], Type::Number)
+        Twin::new("energy_conserving", "distribution_ggx", &[], &[Type::Number; 2], Type::Number)
             .expect(|x| distribution_ggx(x[0], x[1]))
             .within(|x| bound::distribution_ggx(Off::exact(x[0]), Off::exact(x[1])))
             .random(|s| {
@@ -103,13 +103,13 @@ fn energy_keeping() -> [Twin; 4] {
             })
             .corners(product(&[&[0.0, 1e-12, 1e-6, 0.25, 1.0], &alphas]))
             .range(0.0, 1.0),
-        Twin::new("energy_keeping", "smith_attenuation", &[], &[Type::Number; 3], Type::Number)
+        Twin::new("energy_conserving", "smith_attenuation", &[], &[Type::Number; 3], Type::Number)
             .expect(|x| smith_attenuation(x[0], x[1], x[2]))
             .within(|x| bound::smith_attenuation(Off::exact(x[0]), Off::exact(x[1]), Off::exact(x[2])))
             .random(|s| vec![s.decades(-6.0, 0.0), s.decades(-6.0, 0.0), s.decades(-5.7, 0.0)])
             .corners(product(&[&[-1.0, 0.0, 1e-7, 0.5, 1.0], &[-1.0, 0.0, 1e-7, 0.5, 1.0], &alphas]))
             .range(0.0, 1415.0),
-        Twin::new("energy_keeping", "gltf_reflection", &[], &arguments, Type::Vector)
+        Twin::new("energy_conserving", "gltf_reflection", &[], &arguments, Type::Vector)
             .expect(|x| gltf_reflection(vector(x, 0), vector(x, 3), vector(x, 6), x[9], vector(x, 10)))
             .within(|x| bound::gltf_reflection(directions(x), x[9], vector(x, 10)))
             .random(|s| [lobe(s), vec![s.next(), s.next(), s.next()]].concat())
@@ -118,5 +118,5 @@ fn energy_keeping() -> [Twin; 4] {
 }
 
 pub fn twins() -> Vec<Twin> {
-    normal_maps().into_iter().chain(occlusions()).chain(energy_keeping()).collect()
+    normal_maps().into_iter().chain(occlusions()).chain(energy_conserving()).collect()
 }

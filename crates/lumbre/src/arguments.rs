@@ -4,7 +4,9 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use lumbre::cost::STUDIES;
+use lumbre::demo::key_help;
 use lumbre::optics::{FlatRule, NoShading, ReflectionModel, Shading};
 use lumbre::render::{Display, RenderingPath};
 use lumbre::scene::{FrameSettings, PackedFormat, ShadowFilter};
@@ -24,7 +26,8 @@ Examples:
   lumbre render room.baked.glb -o room.png       draw it without a window
   lumbre trace room.glb -o room.png              the same by ray tracing: mirrors, glass, shadows
   lumbre explain room.glb                        what it calls for, and what it does not
-  lumbre cost -o report                          what accuracy costs in time, on this machine"
+  lumbre cost -o report                          what accuracy costs in time, on this machine
+  lumbre tune room.glb --frame-ms 16             the best settings within a time"
 )]
 pub struct Arguments {
     /// The command; without one, a file is opened in a window, or the demo level is played.
@@ -37,21 +40,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Play a level, or view any glTF file; without a display, write a short tour of it to PNG files.
-    #[command(after_help = "\
-Keys:
-  drag with the left button   turn            O, Home   show everything, turn around it
-  with the right or middle    shift           V         the file's next camera
-  wheel                       come nearer     B         bake in the background; again or Esc cancels
-  W A S D, Shift, Space       walk or fly     K         keep the bake: writes NAME.baked.glb beside the file
-  click                       look around     E         adapt the exposure
-  drop a file                 open it         1 2 3 G R L M T F   shading, reflection, lightmaps, multisampling, torch, flight
-  Tab                         the overlay     N         how many lights are tested
-                                              Q         quit
-
-Examples:
-  lumbre play
-  lumbre play room.baked.glb
-  lumbre play --headless --frames-dir tour")]
+    #[command(after_help = play_help())]
     Play(Play),
     /// Bake radiosity into lightmaps.
     #[command(after_help = "\
@@ -92,30 +81,39 @@ Examples:
     Explain(Explain),
     /// Measure what accuracy costs in time; writes a page with plots and pictures, and the same as JSON and
     /// CSV.
-    #[command(after_help = "\
-Studies:
-  shading        flat, Gouraud and Phong shading
-  need           shading by need over the error allowed
-  lamps          many lights, and how they are found
-  shadows        shadow maps by size and filter, against rays
-  effects        every effect of a scene, switched off in turn
-  bake           the error that a bake is asked for
-  preprocessing  light that bounces, before the game or in it
-  transport      from the frame to the truth
-  reflection     reflection models against Phong's
-  lightmaps      density and format of lightmaps
-  precision      f32 on the device against f64
-
-Examples:
-  lumbre cost -o report --quick
-  lumbre cost room.glb -o report --study effects --study bake
-  lumbre cost -o report --resume
-  lumbre cost --compare before/cost.json after/cost.json")]
+    #[command(after_help = cost_help())]
     Cost(Cost),
     /// Measure all ways to draw a level and find the one that keeps a time or an error; can write the level
     /// with it.
-    #[command(after_help = "lumbre tune level.glb --frame-ms 16 -o level.tuned.glb")]
+    #[command(after_help = "\
+Examples:
+  lumbre tune level.glb --frame-ms 16 -o level.tuned.glb
+  lumbre tune level.glb --error 0.02")]
     Tune(Tune),
+}
+
+/// The keys of the window, and examples.
+fn play_help() -> String {
+    let keys = key_help();
+    format!(
+        "Keys:\n{keys}\nExamples:
+  lumbre play
+  lumbre play room.baked.glb
+  lumbre play --headless --frames-dir tour"
+    )
+}
+
+/// The studies, and examples.
+fn cost_help() -> String {
+    let studies: String =
+        STUDIES.iter().map(|study| format!("  {:<15}{}\n", study.name, study.about)).collect();
+    format!(
+        "Studies:\n{studies}\nExamples:
+  lumbre cost -o report --quick
+  lumbre cost room.glb -o report --study effects --study bake
+  lumbre cost -o report --resume
+  lumbre cost --compare before/cost.json after/cost.json"
+    )
 }
 
 /// Options for reading files.
@@ -630,10 +628,11 @@ fn gltf_file(text: &str) -> Result<PathBuf, String> {
         .is_some_and(|extension| ["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known)));
     match is_named_so || path.exists() {
         true => Ok(path),
-        false => Err(
-            "neither a .glb or .gltf file nor a command: play, bake, render, trace, compare, explain, cost"
-                .into(),
-        ),
+        false => {
+            let arguments = Arguments::command();
+            let commands: Vec<&str> = arguments.get_subcommands().map(clap::Command::get_name).collect();
+            Err(format!("neither a .glb or .gltf file nor a command: {}", commands.join(", ")))
+        }
     }
 }
 

@@ -81,13 +81,23 @@ fn help_shows_examples_and_bad_usage_exits_with_2() {
 #[test]
 fn what_is_neither_a_command_nor_a_file_is_told_apart() {
     let output = lumbre(&["paint"]);
-    assert!(stderr(&output).contains("neither") && stderr(&output).contains("render"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("neither"), "{}", stderr(&output));
+    for command in ["play", "bake", "render", "trace", "compare", "explain", "cost", "tune"] {
+        assert!(stderr(&output).contains(command), "{command}: {}", stderr(&output));
+        let help = lumbre(&[command, "--help"]);
+        assert!(stdout(&help).contains("Examples:"), "{command}: {}", stdout(&help));
+    }
     let output = lumbre(&["nowhere.glb", "--headless"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(stderr(&output).contains("nowhere.glb"), "{}", stderr(&output));
     let output = lumbre(&["play", "--help"]);
-    for wanted in ["NAME.baked.glb", "drop a file", "Esc cancels"] {
+    for wanted in ["NAME.baked.glb", "drop a file", "Esc cancels", "  X  ", "  P  ", "  ,  ", "  .  "] {
         assert!(stdout(&output).contains(wanted), "{wanted}: {}", stdout(&output));
+    }
+    let output = lumbre(&["cost", "--help"]);
+    for study in lumbre::cost::STUDIES {
+        let line = format!("  {} ", study.name);
+        assert!(stdout(&output).contains(&line), "{line}: {}", stdout(&output));
     }
 }
 

@@ -1,4 +1,4 @@
-//! Scenes that are baked for a study, and how far the texels of one bake are from those of another. Not the studies.
+//! Bakes scenes for studies, and compares the texels of two bakes.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -15,15 +15,16 @@ use crate::picture::Picture;
 use crate::scene_file::SceneFile;
 use crate::{Conditions, CostError, ErrorOf};
 
-/// A World with its lightmaps, and what its bake says of itself.
+/// A World with its lightmaps, and the report of the bake.
 pub struct Baked {
     /// The World.
     pub world: World,
-    /// What the bake says.
+    /// The report of the bake.
     pub report: BakeReport,
 }
 
-/// What the bakes of a study have in common: as many texels along a metre as give about `texels` in all, no probes.
+/// Returns the options that the bakes of a study share: a density that gives about `texels` texels in all,
+/// and no probes.
 ///
 /// # Errors
 /// [`CostError::Load`].
@@ -34,14 +35,14 @@ pub fn bake_options(
 ) -> Result<BakeOptions, CostError> {
     let mut world = scene.open(conditions.aspect())?;
     let area = static_area(&mut world);
-    // Two digits are as good, and shorter on the command line.
+    // Two digits are accurate enough, and keep the command line short.
     let exact = (texels / area.max(1e-12)).sqrt();
     let unit = 10f64.powf(exact.log10().floor() - 1.0);
     let density = Density::TexelsPerMeter((exact / unit).round() * unit);
     Ok(BakeOptions { density, probes: Probes::Never, resolution_error: false, ..BakeOptions::default() })
 }
 
-/// How `lumbre bake` is asked for that density, with what else the bakes of a study have in common.
+/// Returns the arguments of `lumbre bake` for these options.
 pub fn bake_arguments(options: &BakeOptions) -> String {
     let density = match options.density {
         Density::TexelsPerMeter(density) => format!(" --texels-per-meter {}", (density * 1e6).round() / 1e6),
@@ -52,7 +53,7 @@ pub fn bake_arguments(options: &BakeOptions) -> String {
     format!("--error {}{density}{patches} --probes never --no-resolution-error --no-reuse", options.error)
 }
 
-/// Why nothing of a scene can be baked, as a sentence; nothing where something can be.
+/// Returns a sentence that says why a scene cannot be baked, or `None` if it can.
 ///
 /// # Errors
 /// [`CostError::Load`].
@@ -61,14 +62,14 @@ pub fn nothing_to_bake(conditions: &Conditions<'_>, scene: &SceneFile) -> Result
     let name = &scene.name;
     Ok(match (static_area(&mut world) > 0.0, has_light_to_bake(&mut world)) {
         (true, true) => None,
-        (false, _) => Some(format!("Nothing of {name} is static, so that there is nothing to bake.")),
+        (false, _) => Some(format!("Nothing in {name} is static, so there is nothing to bake.")),
         (_, false) => Some(format!(
-            "{name} has no light that is baked, no emission and no sky: its lightmaps would be black."
+            "{name} has no baked lights, no emission and no sky, so its lightmaps would be black."
         )),
     })
 }
 
-/// Square metres of what is baked.
+/// Returns the area of everything that is baked, in square metres.
 fn static_area(world: &mut World) -> f64 {
     let hidden = hidden_entities(world);
     let mut objects = world.query_filtered::<(Entity, &Mesh, &GlobalTransform), With<StaticObject>>();
@@ -89,7 +90,7 @@ fn static_area(world: &mut World) -> f64 {
     objects.iter(world).filter(|(entity, ..)| !hidden.contains(entity)).map(area).sum()
 }
 
-/// Bakes a scene. `told` are the shares of the study that are done before and after.
+/// Bakes a scene. `told` are the fractions of the study that are done before and after.
 ///
 /// # Errors
 /// [`CostError::Bake`], [`CostError::Load`], [`CostError::Interrupted`].
@@ -104,7 +105,8 @@ pub fn bake_scene(
     Ok(Baked { world, report })
 }
 
-/// Bakes a World, keeping of a former bake what can be kept; with the samples for the next time.
+/// Bakes a World, reusing the samples of a former bake where possible, and returns the samples for the next
+/// bake.
 ///
 /// # Errors
 /// [`CostError::Bake`], [`CostError::Interrupted`].
@@ -120,7 +122,8 @@ pub fn bake_world(
     Ok((Baked { world, report }, samples))
 }
 
-/// Tells how far a study is while something bakes; `told` are its shares before and after.
+/// Returns a callback that reports the progress of a bake; `told` are the fractions of the study that are
+/// done before and after.
 fn telling<'a>(
     conditions: &Conditions<'a>,
     [before, after]: [f64; 2],
@@ -129,7 +132,7 @@ fn telling<'a>(
     move |progress| listener(Some(before + f64::from(progress.fraction) * (after - before)))
 }
 
-/// The lightmaps of a World that has just been baked.
+/// Returns the lightmaps of a World that has just been baked.
 pub fn maps_of(world: &mut World) -> Maps {
     let mut maps = world.query::<(&Lightmap, &TexelErrors)>();
     let named = maps
@@ -138,10 +141,11 @@ pub fn maps_of(world: &mut World) -> Maps {
     named.collect()
 }
 
-/// Columns in which texels are kept.
+/// Number of columns of a picture of texels.
 const COLUMNS: usize = 256;
 
-/// The texels of all maps one after the other, in their names' order; not a number where one shows no surface.
+/// Returns the texels of all maps one after the other, in the order of their names. Texels that show no
+/// surface are NaN.
 pub fn picture_of_maps(maps: &Maps) -> Picture {
     let of_map = |(image, errors): &(Arc<LightmapImage>, Arc<[f32]>)| {
         let texels = image.texels.iter().zip(errors.iter());
@@ -154,12 +158,15 @@ pub fn picture_of_maps(maps: &Maps) -> Picture {
     Picture { width: COLUMNS, radiance }
 }
 
-/// By which part the noise that a bake states of itself may be off.
+/// Relative uncertainty of the noise that a bake states.
 const NOISE_KNOWN_TO: f64 = 0.2;
 
-/// How far texels are from those of a reference of the same maps: root mean square and largest difference, relative to the reference's mean, over the texels
-/// that show a surface in both. The reference's own noise, as it states it, is known and independent, and is taken off; what is left open is that a
-/// fifth of it is not so well known. Where the noise explains all of the difference, the error may be anything up to the difference itself. Nothing where the maps are not the same.
+/// Returns the difference of texels from those of a reference bake of the same maps: root mean square and
+/// largest difference relative to the reference's mean, over the texels that show a surface in both.
+///
+/// The reference's noise is independent, and its stated variance is subtracted. The uncertainty follows from
+/// [`NOISE_KNOWN_TO`]. If the noise explains all of the difference, the error may have any value up to the
+/// difference itself. `None` if the maps differ in name or size.
 pub fn texel_error(found: &Maps, reference: &Maps) -> Option<ErrorOf> {
     let (mut squares, mut noise, mut sum, mut largest, mut count) = (0.0, 0.0, 0.0, 0.0_f64, 0.0);
     for (name, (wanted, wanted_errors)) in reference {
@@ -224,7 +231,8 @@ mod tests {
         // A map without error against a noisy reference that knows its noise.
         let none = texel_error(&truth, &noisy(0.05)).expect("the maps are alike");
         assert!(none.relative_rmse < 1e-3 && none.uncertainty > 0.01, "{none:?}");
-        // A reference that states more noise than there is any difference tells only that the error is no larger than that.
+        // A reference that states more noise than there is difference only shows that the error is at most
+        // the difference.
         let unsure = texel_error(&truth, &maps(noisy(0.05)["floor"].0.texels.clone(), 0.2))
             .expect("the maps are alike");
         assert_eq!(unsure.relative_rmse, 0.0);

@@ -1,5 +1,8 @@
-//! A mesh with fewer triangles: vertices that lie in one cell of a grid become one (Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex scenes", 1993).
-//! Quick, whatever a scan is like, and not the least error for so many triangles. Not for meshes whose texture coordinates or colours tell: those are dropped.
+//! Simplifies meshes by merging all vertices in a cell of a grid (Rossignac and Borrel, "Multi-resolution 3D
+//! approximations for rendering complex scenes", 1993).
+//!
+//! This is fast and works for any mesh, but does not give the smallest error for a number of triangles.
+//! Texture coordinates and vertex colours are dropped.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -8,11 +11,13 @@ use glam::{DVec3, Vec3};
 use lumbre_mesh::normals::{NormalWeight, compute_smooth_normals};
 use lumbre_mesh::{MeshError, TriangleMesh};
 
-/// The mesh by a grid of `cells` along the longest side of its bounding box, at least 1: each cell's vertices are one at their mean, with the
-/// mean of their normals, and triangles that have lost a side are gone. A mesh without normals has those of its faces, by area.
+/// Returns the mesh simplified by a grid with `cells` cells (at least 1) along the longest side of its
+/// bounding box. The vertices in a cell become one, at their mean position and with the mean of their
+/// normals; triangles that lose a side are removed. A mesh without normals gets smooth normals, weighted by
+/// area.
 ///
 /// # Errors
-/// [`MeshError`] where the mesh is not sound.
+/// [`MeshError`] if the mesh is invalid.
 pub fn clustered(scan: &TriangleMesh, cells: u32) -> Result<TriangleMesh, MeshError> {
     scan.validate()?;
     let mesh = match scan.normals.is_empty() {
@@ -24,7 +29,7 @@ pub fn clustered(scan: &TriangleMesh, cells: u32) -> Result<TriangleMesh, MeshEr
     let most = finite().fold(Vec3::splat(f32::MIN), |most, point| most.max(*point));
     let side = f64::from((most - least).max_element().max(f32::MIN_POSITIVE)) / f64::from(cells.max(1));
     let mut places: HashMap<[i64; 3], u32> = HashMap::new();
-    // Of positions, of normals, and how many vertices they are.
+    // Sum of positions, sum of normals, and number of vertices of each cluster.
     let mut sums: Vec<(DVec3, DVec3, f64)> = Vec::new();
     let cluster_of: Vec<u32> = mesh
         .positions
@@ -69,7 +74,7 @@ mod tests {
             let coarse = clustered(&fine, cells).expect("a sphere is sound");
             assert!(coarse.triangle_count() > 2 * before && coarse.triangle_count() < fine.triangle_count());
             before = coarse.triangle_count();
-            // A mean of points within a cell, whose diagonal is √3 sides of 2 / cells.
+            // The mean of points in a cell is off by at most its diagonal, √3 times its side of 2 / cells.
             let off = 3f32.sqrt() * 2.0 / cells as f32;
             for (point, normal) in coarse.positions.iter().zip(&coarse.normals) {
                 assert!((1.0 - off..=1.0 + 1e-6).contains(&point.length()), "{point}");

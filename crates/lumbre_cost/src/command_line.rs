@@ -1,6 +1,6 @@
-//! Commands as a POSIX shell reads them, as far as the commands of a report go. Not their running.
+//! Quotes and splits the commands of a report as a POSIX shell does.
 
-/// A word of a shell's command, quoted if need be.
+/// Returns a word of a shell command, quoted if necessary.
 pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-+:".contains(c);
     match !word.is_empty() && word.chars().all(plain) {
@@ -9,7 +9,7 @@ pub fn quoted(word: &str) -> String {
     }
 }
 
-/// The words of each of the commands that a point's line joins by `&&`, without their quotes.
+/// Returns the words, without quotes, of each command in a line that joins commands by `&&`.
 pub fn command_words(line: &str) -> Vec<Vec<String>> {
     let mut commands: Vec<Vec<String>> = vec![Vec::new()];
     let mut word: Option<String> = None;

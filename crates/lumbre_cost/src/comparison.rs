@@ -1,5 +1,5 @@
-//! Two reports side by side: counts and errors, which do not depend on the hour, beyond a factor; and times, only where their quartiles lie
-//! apart. Not the measuring.
+//! Compares two reports. Counts and errors differ if they differ by more than a factor; times, only if their
+//! quartiles do not overlap either.
 
 use std::fmt;
 
@@ -9,68 +9,68 @@ use crate::{CostReport, Point, Spread};
 /// A difference between two reports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// Of which study.
+    /// The study.
     pub study: String,
-    /// Of which point, as series and label; empty if it is the study as a whole.
+    /// Series and label of the point; empty if the change concerns the whole study.
     pub point: String,
-    /// What differs.
+    /// The difference.
     pub what: What,
 }
 
-/// What differs between two reports.
+/// The kind of a difference between two reports.
 #[derive(Clone, Debug, PartialEq)]
 pub enum What {
-    /// It is in the first alone.
+    /// It is only in the first report.
     Gone,
-    /// It is in the second alone.
+    /// It is only in the second report.
     New,
-    /// A count is another one.
+    /// A count differs.
     Count {
-        /// Its name.
+        /// The name of the count.
         name: String,
-        /// In the first.
+        /// Its value in the first report.
         before: f64,
-        /// In the second.
+        /// Its value in the second report.
         after: f64,
     },
-    /// It is not counted any more.
+    /// A count is only in the first report.
     Uncounted {
-        /// Its name.
+        /// The name of the count.
         name: String,
     },
-    /// It is counted for the first time.
+    /// A count is only in the second report.
     Counted {
-        /// Its name.
+        /// The name of the count.
         name: String,
     },
-    /// It has no time or no error any more.
+    /// It has a time or an error only in the first report.
     Lost(Figure),
-    /// It has a time or an error for the first time.
+    /// It has a time or an error only in the second report.
     Gained(Figure),
-    /// It was measured in another way, so that nothing of it is compared.
+    /// It was measured by another method, and is not compared.
     Method {
-        /// In the first.
+        /// The method of the first report.
         before: u32,
-        /// In the second.
+        /// The method of the second report.
         after: u32,
     },
-    /// The error is another one.
+    /// The error differs.
     Error {
-        /// In the first, as a share.
+        /// Its value in the first report, as a fraction.
         before: f64,
-        /// In the second, as a share.
+        /// Its value in the second report, as a fraction.
         after: f64,
     },
-    /// The time is another one, and the quartiles lie apart.
+    /// The time differs, and the quartiles do not overlap.
     Time {
-        /// In the first.
+        /// Its value in the first report.
         before: Spread,
-        /// In the second.
+        /// Its value in the second report.
         after: Spread,
     },
 }
 
-/// What a point may have or not.
+/// What a point may lack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Figure {
     /// A time.
@@ -80,19 +80,20 @@ pub enum Figure {
 }
 
 impl Figure {
-    fn name(self) -> &'static str {
+    fn with_article(self) -> &'static str {
         match self {
-            Self::Time => "time",
-            Self::Error => "error",
+            Self::Time => "a time",
+            Self::Error => "an error",
         }
     }
 }
 
-/// Errors below this differ by rounding: a factor between them means nothing.
+/// Errors below this are rounding errors, whose ratio means nothing.
 const NEGLIGIBLE_ERROR: f64 = 1e-5;
 
 impl Change {
-    /// Whether the second report is the worse one by it: a point, a count or an error is gone, or a count or an error grew. Times are no failure by themselves.
+    /// Returns true if the second report is worse by this change: a point, a count or an error is missing, or
+    /// a count or an error is larger. Times alone do not make a report worse.
     pub fn is_worse(&self) -> bool {
         match &self.what {
             What::Gone | What::Uncounted { .. } | What::Lost(Figure::Error) => true,
@@ -102,7 +103,7 @@ impl Change {
         }
     }
 
-    /// Whether it is a time that grew.
+    /// Returns true if it is a time that is longer in the second report.
     pub fn is_slower(&self) -> bool {
         matches!(&self.what, What::Time { before, after } if after.median > before.median)
     }
@@ -119,16 +120,12 @@ impl fmt::Display for Change {
             _ => format!(" ({} times)", rounded(after / before)),
         };
         match &self.what {
-            What::Gone => write!(f, ": is not there any more"),
+            What::Gone => write!(f, ": is missing"),
             What::New => write!(f, ": is new"),
-            What::Uncounted { name } => write!(f, ": {name} is not counted any more"),
+            What::Uncounted { name } => write!(f, ": {name} is no longer counted"),
             What::Counted { name } => write!(f, ": {name} is counted for the first time"),
-            What::Lost(figure) => write!(f, ": has no {} any more", figure.name()),
-            What::Gained(figure) => write!(
-                f,
-                ": has {} for the first time",
-                if *figure == Figure::Time { "a time" } else { "an error" }
-            ),
+            What::Lost(figure) => write!(f, ": no longer has {}", figure.with_article()),
+            What::Gained(figure) => write!(f, ": has {} for the first time", figure.with_article()),
             What::Method { before, after } => {
                 write!(f, ": was measured by method {after} instead of {before}, and is not compared")
             }
@@ -148,7 +145,7 @@ impl fmt::Display for Change {
     }
 }
 
-/// What is different in the second report, beyond a factor (more than 1) in either direction.
+/// Returns the differences between two reports that exceed a factor (above 1) in either direction.
 pub fn compare_reports(before: &CostReport, after: &CostReport, factor: f64) -> Vec<Change> {
     let mut changes = Vec::new();
     let whole = |study: &str, what| Change { study: study.to_owned(), point: String::new(), what };
@@ -214,7 +211,7 @@ fn differences(before: &Point, after: &Point, factor: f64) -> Vec<What> {
         }
     }
     if let (Some(was), Some(is)) = (before.error, after.error) {
-        // What the references themselves leave open is no change.
+        // Differences within the references' own uncertainty are not reported.
         let open = was.uncertainty + is.uncertainty + NEGLIGIBLE_ERROR;
         let (was, is) = (was.relative_rmse, is.relative_rmse);
         if beyond(was, is) && (was - is).abs() > open {

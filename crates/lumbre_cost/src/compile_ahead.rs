@@ -1,6 +1,9 @@
-//! Shaders that are compiled before the frames that need them are drawn. A software rasterizer compiles a shader when it first draws with it, on one thread, for longer than
-//! many frames take; but it keeps the code on disk (Mesa's shader cache) for every device of the machine. So the other core draws the same frames on a device of its own,
-//! from the last to the first, while they are drawn from the first to the last, until both have met. Nothing is timed meanwhile.
+//! Compiles shaders before the frames that need them are drawn.
+//!
+//! A software rasterizer compiles a shader when it first draws with it, on one thread, which takes longer
+//! than many frames. But it stores the code on disk (Mesa's shader cache), where all devices of the machine
+//! find it. So while the frames are drawn from the first to the last, a second thread draws the same frames
+//! on a device of its own, from the last to the first, until the two meet. Nothing is timed meanwhile.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,40 +11,41 @@ use lumbre_render::{Gpu, Offscreen, OffscreenFormat, RenderError, Renderer};
 
 use crate::frame::{Frame, picture_options};
 
-/// What is drawn of each frame: its picture, of full precision, and what is timed.
+/// The drawings of a frame: its picture in full precision, and the frame as it is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drawing {
     Picture,
     Timed,
 }
 
-/// What has been begun of each frame, by whoever draws it.
+/// Which drawings of each frame have been started, by either thread.
 #[derive(Debug)]
 pub struct Begun(Vec<[AtomicBool; 2]>);
 
 impl Begun {
-    /// Nothing yet, of so many frames.
+    /// Returns the state for this many frames, with nothing started.
     pub fn none_of(frames: usize) -> Self {
         Self((0..frames).map(|_| Default::default()).collect())
     }
 
-    /// Notes that a drawing of a frame is begun; whether it is the first time.
+    /// Marks a drawing of a frame as started. Returns true if it was not started before.
     pub fn begin(&self, frame: usize, drawing: Drawing) -> bool {
         !self.0[frame][drawing as usize].swap(true, Ordering::Relaxed)
     }
 }
 
-/// A device for it, if the adapter compiles when it draws, there are two cores at least, and devices do not take turns, as those of OpenGL do.
+/// Returns a device for compiling ahead, if the adapter compiles shaders when it draws, there are at least
+/// two cores, and devices do not block each other, as those of OpenGL do.
 pub fn device_ahead(gpu: &Gpu) -> Option<Gpu> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     if !gpu.is_software() || !gpu.has_independent_devices() || cores < 2 {
         return None;
     }
-    // Without it shaders are compiled when they are needed.
+    // Without a second device, shaders are compiled when they are needed.
     gpu.another().inspect_err(|error| tracing::debug!("nothing is compiled ahead: {error}")).ok()
 }
 
-/// Makes those drawings of the frames that nobody has begun, from the last frame to the first, until `end` is set.
+/// Makes the drawings that have not been started, from the last frame to the first, until `end` is set.
 pub fn compile_ahead(
     gpu: &Gpu,
     size: (u32, u32),
@@ -51,7 +55,7 @@ pub fn compile_ahead(
     end: &AtomicBool,
 ) {
     if let Err(error) = draw(gpu, size, frames, drawings, begun, end) {
-        // Whoever draws the frame for its own sake meets it, too, and says so.
+        // The thread that draws the frame for its result gets the same error, and reports it.
         tracing::debug!("nothing more is compiled ahead: {error}");
     }
 }
@@ -80,7 +84,7 @@ fn draw(
                 Drawing::Timed => (&timed, frame.options.clone()),
             };
             renderer.render(&mut frame.world(), &target.target(), &options)?;
-            // The World is free for others while this is compiled.
+            // The World is available to the other thread while this is compiled.
             renderer.wait()?;
         }
     }

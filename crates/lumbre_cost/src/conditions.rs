@@ -1,4 +1,4 @@
-//! What every study is run under: the device, the effort, the sizes, and who is told how far it is. Not what is studied.
+//! The conditions that all studies are run under: device, effort, sizes, and the listener for progress.
 
 use std::cell::RefCell;
 use std::ops::ControlFlow;
@@ -13,54 +13,58 @@ use crate::rounds::Rounds;
 
 use crate::{CostError, Spread};
 
-/// By which factor the frames of a quick report have less time than those of a full one.
+/// How many times less time a quick report spends on frames than a full one.
 const QUICK: f64 = 14.0;
 
-/// Who is told how much of a study is done, 0 to 1, or nothing new, and says whether to go on. Called from any thread.
+/// Receives the fraction of a study that is done, or `None` if there is nothing new, and decides whether to
+/// go on. It is called from any thread.
 pub type Listener<'a> = dyn Fn(Option<f64>) -> ControlFlow<()> + Sync + 'a;
 
-/// What every study is run under.
+/// The conditions that all studies are run under.
 #[derive(Clone, Copy)]
 pub struct Conditions<'a> {
     /// The device that draws.
     pub gpu: &'a Gpu,
-    /// Another device, on which shaders are compiled ahead of the frames that need them; where a GPU draws there is none.
+    /// A second device, on which shaders are compiled before the frames that need them are drawn. `None` for
+    /// hardware GPUs.
     pub ahead: Option<&'a Gpu>,
-    /// Draws all pictures of a study: what it has compiled for one serves the next.
+    /// The renderer for all pictures of a study, so that compiled shaders are reused.
     pub pictures: &'a RefCell<Renderer>,
-    /// Bakes that a report has already, for studies that want the same.
+    /// Converged bakes that earlier studies of the report have made.
     pub converged: &'a ConvergedBakes,
-    /// Fewer points and rounds.
+    /// Whether to measure fewer points and rounds.
     pub quick: bool,
-    /// Nothing is timed and nothing compared: whatever serves only that is done once, or cut short.
+    /// Whether only counts are wanted: nothing is timed or compared, and whatever serves only that is done
+    /// once, or cut short.
     pub counts_only: bool,
     /// Width and height of the study's pictures in pixels.
     pub size: (u32, u32),
-    /// Width and height that the report was asked for: a study may draw smaller pictures.
+    /// Requested width and height. A study may draw smaller pictures.
     pub size_of_report: (u32, u32),
-    /// Of everything that draws random numbers.
+    /// Seed of all random numbers.
     pub seed: u32,
-    /// The folder of the report: scenes that a study makes are written below it.
+    /// The report's folder. Scenes that a study creates are written below it.
     pub folder: &'a Path,
-    /// Scenes that were given; without any a study makes its own.
+    /// The scene files that were passed; if there are none, a study creates its own scene.
     pub files: &'a [PathBuf],
-    /// Frames are timed as a window shows them, with a tone curve, in eight bits. Otherwise as their pictures are drawn, in linear light and floats: then a picture and its time come from the same
-    /// pipelines, which a software rasterizer takes longer to compile than to draw with a few times.
+    /// Whether frames are timed as a window shows them, with a tone curve and in eight bits. Otherwise they
+    /// are timed as their pictures are drawn, in linear floats, so that both use the same pipelines: a
+    /// software rasterizer takes longer to compile a pipeline than to draw a few frames.
     pub as_shown: bool,
-    /// Who is told.
+    /// The listener for progress.
     pub listener: &'a Listener<'a>,
 }
 
 impl Conditions<'_> {
-    /// Width by height.
+    /// Returns width divided by height.
     pub fn aspect(&self) -> f64 {
         f64::from(self.size.0) / f64::from(self.size.1)
     }
 
-    /// Tells how much of the study is done.
+    /// Reports the fraction of the study that is done.
     ///
     /// # Errors
-    /// [`CostError::Interrupted`] if somebody asked for an end.
+    /// [`CostError::Interrupted`] if the listener asks to stop.
     pub fn tell(&self, fraction: f64) -> Result<(), CostError> {
         match (self.listener)(Some(fraction)) {
             ControlFlow::Continue(()) => Ok(()),
@@ -68,23 +72,24 @@ impl Conditions<'_> {
         }
     }
 
-    /// Rounds for about so many seconds, a small part of them if it has to be quick; none for counts alone.
+    /// Returns rounds for about this many seconds of a full report, with less time in a quick one, and
+    /// without any timing if only counts are wanted.
     pub fn rounds(&self, seconds: f64) -> Rounds {
         match self.quick {
-            _ if self.counts_only => Rounds { warm_up: 0, fewest: 0, most: 0, time: Duration::ZERO },
-            true => {
-                Rounds { warm_up: 1, fewest: 5, most: 15, time: Duration::from_secs_f64(seconds / QUICK) }
-            }
-            false => Rounds { warm_up: 1, fewest: 5, most: 51, time: Duration::from_secs_f64(seconds) },
+            _ if self.counts_only => Rounds { warm_up: 0, min: 0, max: 0, time: Duration::ZERO },
+            true => Rounds { warm_up: 1, min: 5, max: 15, time: Duration::from_secs_f64(seconds / QUICK) },
+            false => Rounds { warm_up: 1, min: 5, max: 51, time: Duration::from_secs_f64(seconds) },
         }
     }
 
-    /// How often work is done that takes too long for rounds by time: as often as its times have to be repeated to be told apart, and once for counts alone.
+    /// Returns the number of repetitions of work that takes too long for [`Self::rounds`]: the fewest with
+    /// which times can be told apart, or one if only counts are wanted.
     pub fn repetitions(&self) -> usize {
-        if self.counts_only { 1 } else { Spread::FEWEST_ROUNDS_THAT_TELL }
+        if self.counts_only { 1 } else { Spread::MIN_ROUNDS_TO_DISTINGUISH }
     }
 
-    /// The command that draws a file's frame as a study draws it, for its picture and for its time. `arguments` are what is asked for besides, each with a space before it.
+    /// Returns the command that draws a file's frame as a study draws it, for its picture and its time. Each
+    /// of the additional `arguments` is preceded by a space.
     pub fn drawing(&self, file: &str, arguments: &str) -> String {
         let asked = format!("{arguments} --size {}", self.size_text());
         let timed = "--frames 20 --timings times.json";
@@ -96,7 +101,8 @@ impl Conditions<'_> {
         }
     }
 
-    /// The command that runs a study again as it was run for this report, in the folder of the report.
+    /// Returns the command that runs a study again as it was run for this report, to be run in the report's
+    /// folder.
     pub fn again(&self, study: &str) -> String {
         let files = self.files.iter().map(|path| {
             let whole = path.canonicalize();
@@ -112,18 +118,19 @@ impl Conditions<'_> {
         )
     }
 
-    /// How long a bake may take that others are compared with, in seconds of a full and of a quick report. For counts alone, which are not compared with it, hardly any time.
+    /// Returns the time limit of a bake that serves as a reference, from the seconds in a full and in a quick
+    /// report. If only counts are wanted, nothing is compared with it, and it ends almost at once.
     pub fn reference_time(&self, full: f64, quick: f64) -> Duration {
         let seconds = if self.counts_only { 0.01 } else { self.unless_quick(full, quick) };
         Duration::from_secs_f64(seconds)
     }
 
-    /// The first of two in a full report, the second in a quick one.
+    /// Returns the first value in a full report, the second in a quick one.
     pub fn unless_quick<T>(&self, full: T, quick: T) -> T {
         if self.quick { quick } else { full }
     }
 
-    /// The pictures' size as the command line has it.
+    /// Returns the size of the pictures as the command line expects it.
     pub fn size_text(&self) -> String {
         Self::text_of(self.size)
     }

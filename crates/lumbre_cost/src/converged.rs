@@ -1,4 +1,4 @@
-//! What is known of the converged bakes of a report, which studies share. Data; not the baking.
+//! Converged bakes, which the studies of a report share.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
@@ -19,7 +19,7 @@ pub struct Converged {
     pub maps: Maps,
     /// The frame that it lights.
     pub picture: Picture,
-    /// What it says of itself.
+    /// The report of the bake.
     pub report: BakeReport,
 }
 
@@ -28,12 +28,12 @@ pub struct Converged {
 pub struct ConvergedBakes(RefCell<HashMap<String, Rc<Converged>>>);
 
 impl ConvergedBakes {
-    /// One that was kept.
+    /// Returns a bake that was kept.
     pub fn get(&self, key: &str) -> Option<Rc<Converged>> {
         self.0.borrow().get(key).map(Rc::clone)
     }
 
-    /// Keeps one for the next study.
+    /// Keeps a bake for later studies.
     pub fn keep(&self, key: String, bake: Converged) -> Rc<Converged> {
         let bake = Rc::new(bake);
         self.0.borrow_mut().insert(key, Rc::clone(&bake));

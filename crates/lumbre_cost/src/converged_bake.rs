@@ -1,4 +1,5 @@
-//! Bakes that others are compared with: as exact as they get within a time, each done once for all studies of a report that want the same. Not what is compared.
+//! Makes converged bakes, which other bakes are compared with: as accurate as they get within a time limit.
+//! Each is made once per report.
 
 use std::rc::Rc;
 use std::time::Duration;
@@ -12,7 +13,8 @@ use crate::frames::draw_picture;
 use crate::scene_file::SceneFile;
 use crate::{Conditions, CostError};
 
-/// The bake of the same texels as `options` bake, with other random numbers, without smoothing, and as exact as it gets within a time.
+/// Returns the options for a converged bake of the texels that `options` bake: with other random numbers,
+/// without smoothing, and as accurate as it gets within a time.
 pub fn converged(conditions: &Conditions<'_>, options: &BakeOptions, time: Duration) -> BakeOptions {
     BakeOptions {
         quality: Quality::Reference,
@@ -24,7 +26,8 @@ pub fn converged(conditions: &Conditions<'_>, options: &BakeOptions, time: Durat
     }
 }
 
-/// The converged bake of a scene as its file has it. `told` are the shares of the study that are done before and after.
+/// Returns the converged bake of a scene. `told` are the fractions of the study that are done before and
+/// after.
 ///
 /// # Errors
 /// [`CostError::Bake`], [`CostError::Load`], [`CostError::Render`], [`CostError::Interrupted`].

@@ -1,4 +1,4 @@
-//! Why a report cannot be made, kept or compared.
+//! Errors of making, writing, reading and comparing reports.
 
 use std::path::PathBuf;
 
@@ -8,81 +8,81 @@ use lumbre_scene::{LightmapFileError, LoadError, SaveError};
 use lumbre_trace::TraceError;
 use thiserror::Error;
 
-/// Why a report cannot be made, kept or compared. Each says what to do about it.
+/// Reasons why a report cannot be made, written, read or compared. Each message says what to do.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CostError {
-    /// Somebody asked it to end. What was finished is kept.
+    /// The listener asked to stop. Finished studies are kept.
     #[error("interrupted")]
     Interrupted,
-    /// A study that there is none of.
+    /// There is no study with this name.
     #[error("there is no study `{name}`; there are: {known}")]
     UnknownStudy {
-        /// What was asked for.
+        /// The name.
         name: String,
-        /// What there is.
+        /// The names of all studies.
         known: String,
     },
-    /// A file or folder of the report.
+    /// A file or folder of the report cannot be read or written.
     #[error("{}: {source}; check the folder given with -o", path.display())]
     File {
-        /// Which.
+        /// Its path.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// A report that is none.
+    /// A file is not a report.
     #[error("{} is no report of lumbre cost ({source}); give a cost.json, or measure anew", path.display())]
     NotAReport {
-        /// Which.
+        /// Its path.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error of the JSON parser.
         source: serde_json::Error,
     },
     /// The table cannot be written.
     #[error("{} cannot be written: {source}; check the folder given with -o", path.display())]
     Table {
-        /// Which.
+        /// Its path.
         path: PathBuf,
-        /// What is wrong.
+        /// The error of the CSV writer.
         source: csv::Error,
     },
     /// A picture cannot be written or read.
     #[error("{}: {source}; remove the folder, or measure without --resume", path.display())]
     Picture {
-        /// Which.
+        /// Its path.
         path: PathBuf,
-        /// What is wrong.
+        /// The error of the image library.
         source: image::ImageError,
     },
-    /// A picture that has another size than the one that it is compared with, or none.
+    /// A picture is missing, or differs in size from its reference.
     #[error("the pictures of \"{point}\" differ in size; give --size a width and height from 8 to 4096")]
     Sizes {
-        /// Which.
+        /// The point.
         point: String,
     },
-    /// A number that is none.
+    /// A value of a point is not finite.
     #[error(
         "\"{point}\" of the study `{study}` holds a value that is not finite; this is a fault of the program, please report it with the scene"
     )]
     NotFinite {
-        /// Which study.
+        /// The study.
         study: String,
-        /// Which point.
+        /// The point.
         point: String,
     },
     /// A plot cannot be drawn.
     #[error("the plot \"{title}\" cannot be drawn: {reason}")]
     Plot {
-        /// Which.
+        /// Study and title of the plot.
         title: String,
-        /// What is wrong.
+        /// The reason.
         reason: String,
     },
-    /// A scene cannot be read.
+    /// A scene cannot be loaded.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// A scene of our own cannot be written.
+    /// A scene cannot be saved.
     #[error(transparent)]
     Save(#[from] SaveError),
     /// A frame cannot be drawn.
@@ -94,7 +94,7 @@ pub enum CostError {
     /// A scene cannot be baked.
     #[error(transparent)]
     Bake(BakeError),
-    /// A lightmap cannot be kept.
+    /// A lightmap cannot be encoded.
     #[error(transparent)]
     Lightmap(#[from] LightmapFileError),
 }

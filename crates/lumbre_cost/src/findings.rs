@@ -1,12 +1,13 @@
-//! Sentences about what was found, from the points alone: which series is the cheapest for which error, where that changes, and that it is not known
-//! where the times do not decide.
+//! Turns points into sentences: which series is the cheapest for which error, where this changes, and where
+//! the times do not decide it; and formats the numbers in them.
 
 use crate::fronts::stretches;
 use crate::{ErrorOf, Point, Spread};
 
-/// Who is the cheapest for which error that may be left, as sentences: from where on one series alone gets to small errors in the least time, where another
-/// one is at least level for large errors, and what lies between. `place` says of what, as in " in the room"; nothing for less than two series that have
-/// times and errors.
+/// Returns sentences that say which series is the cheapest for which error: the range of small errors that
+/// one series reaches in the least time, the range of large errors for which one series is at least as cheap
+/// as all others, and what lies between them. `place` names the scene, as in " in the room". `None` if fewer
+/// than two series have times and errors.
 pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
     let mut series: Vec<&str> = Vec::new();
     for point in points.iter().filter(|point| point.error.is_some() && point.milliseconds.is_some()) {
@@ -20,7 +21,7 @@ pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
         return None;
     }
     let mut sentences = Vec::new();
-    // From the smallest error on: as long as one and the same series wins, or none does.
+    // The range from the smallest error upwards in which the winners stay the same.
     let fine = found.iter().take_while(|stretch| same(&stretch.cheapest, &finest.cheapest)).count();
     let end = found[fine - 1].to;
     let range = match end.is_infinite() {
@@ -41,7 +42,7 @@ pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
             format!("{range} the {what} do not decide between {}.", names_of(several))
         }
     });
-    // From the largest error downwards: as long as one series is among the cheapest.
+    // The range from the largest error downwards in which one series is always among the cheapest.
     if fine < found.len() {
         let rest = &found[fine..];
         let lasting = |point: &&&Point| {
@@ -62,7 +63,9 @@ pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
             let from = stretches[0].from;
             let level = match level.is_empty() {
                 true => String::new(),
-                false => format!(", in parts of that range level with {}", listed(&level, "and")),
+                false => {
+                    format!(", in parts of this range not distinguishable from {}", listed(&level, "and"))
+                }
             };
             sentences.push(format!("Above {} the cheapest is {}{level}.", percent(from), winner.series));
             let between = &rest[..rest.len() - coarse];
@@ -73,7 +76,7 @@ pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
                 let names = names_of(&all);
                 sentences.push(match same(&all[..1], &between[0].cheapest) && between.len() == 1 {
                     true => format!("{range} the cheapest is {names}."),
-                    false => format!("{range} that changes from choice to choice ({names})."),
+                    false => format!("{range} the cheapest series changes several times ({names})."),
                 });
             }
         }
@@ -81,17 +84,17 @@ pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
     let contends = |name: &str| found.iter().any(|s| s.cheapest.iter().any(|point| point.series == name));
     let never: Vec<&str> = series.iter().copied().filter(|name| !contends(name)).collect();
     if !never.is_empty() {
-        sentences.push(format!("Never so: {}.", listed(&never, "and")));
+        sentences.push(format!("Never the cheapest: {}.", listed(&never, "and")));
     }
     Some(sentences.join(" "))
 }
 
-/// Whether two lists are of the same series.
+/// Returns true if two lists contain points of the same series.
 fn same(a: &[&Point], b: &[&Point]) -> bool {
     a.len() == b.len() && a.iter().all(|point| b.iter().any(|other| other.series == point.series))
 }
 
-/// The names of their series, each once.
+/// Returns the names of the points' series, each once.
 fn names_of(points: &[&Point]) -> String {
     let mut names: Vec<&str> = Vec::new();
     for point in points {
@@ -102,21 +105,22 @@ fn names_of(points: &[&Point]) -> String {
     listed(&names, "and")
 }
 
-/// The point of a series with the smallest error.
+/// Returns the point of a series with the smallest error.
 fn smallest<'a>(points: &[&'a Point], series: &str) -> Option<&'a Point> {
     let own = points.iter().filter(|point| point.series == series && point.milliseconds.is_some());
     let known = own.filter_map(|point| Some((*point, point.error?.relative_rmse)));
     known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(point, _)| point)
 }
 
-/// A point's time and error.
+/// Returns a point's time and error in words.
 pub fn cost_of(point: &Point) -> String {
     let time = point.milliseconds.as_ref().map(milliseconds);
     let error = point.error.map(|error| format!("{} of error", error_of(&error)));
     time.into_iter().chain(error).collect::<Vec<_>>().join(", ")
 }
 
-/// An error as per cent, with what is not known of it; where that is more than itself, as what it is at most.
+/// Returns an error in per cent with its uncertainty; if the uncertainty exceeds the error, the largest value
+/// that it may have.
 pub fn error_of(error: &ErrorOf) -> String {
     let ErrorOf { relative_rmse, uncertainty, .. } = *error;
     match uncertainty {
@@ -126,22 +130,24 @@ pub fn error_of(error: &ErrorOf) -> String {
     }
 }
 
-/// How much longer the first takes than the second, as a factor with the interval of its median, from times of the same rounds; nothing without any.
+/// Returns the ratio of the first times to the second, as the median with its interval over pairs from the
+/// same round. `None` without any pairs.
 pub fn ratio_of(first: &[f64], second: &[f64]) -> Option<Spread> {
     let ratios: Vec<f64> = first.iter().zip(second).map(|(a, b)| a / b.max(1e-9)).collect();
     Spread::of_median(&ratios)
 }
 
-/// Whether a factor is told apart from 1: `Some(true)` above, `Some(false)` below, nothing where its interval holds 1 or there are too few rounds.
+/// Returns whether a ratio is above 1, or `None` if its interval contains 1 or there are too few rounds.
 pub fn is_above_one(ratio: &Spread) -> Option<bool> {
-    match (ratio.rounds >= Spread::FEWEST_PAIRS_THAT_TELL, ratio.lower > 1.0, ratio.upper < 1.0) {
+    match (ratio.rounds >= Spread::MIN_PAIRS_TO_DISTINGUISH, ratio.lower > 1.0, ratio.upper < 1.0) {
         (true, true, _) => Some(true),
         (true, _, true) => Some(false),
         _ => None,
     }
 }
 
-/// A factor between times with its interval; where it is not told apart from 1, that, and by how many rounds.
+/// Returns a ratio of times with its interval; if it is not distinguishable from 1, that is said, with the
+/// number of rounds.
 pub fn factor(ratio: &Spread) -> String {
     let [median, lower, upper] = [ratio.median, ratio.lower, ratio.upper].map(rounded);
     let open = match is_above_one(ratio) {
@@ -151,7 +157,8 @@ pub fn factor(ratio: &Spread) -> String {
     format!("{median} ({lower} to {upper}{open})")
 }
 
-/// How many times the second time the first one is, by their medians and ranges; where the ranges do not lie apart, that, and by how many rounds.
+/// Returns how many times the second time the first one is, by their medians and ranges; if the ranges
+/// overlap, that is said, with the number of rounds.
 pub fn times_of(first: &Spread, second: &Spread) -> String {
     let [median, lower, upper] =
         [first.median / second.median, first.lower / second.upper, first.upper / second.lower].map(rounded);
@@ -169,7 +176,7 @@ pub fn rounds(count: usize) -> String {
     format!("{count} {}", if count == 1 { "round" } else { "rounds" })
 }
 
-/// A number with about three digits.
+/// Returns a number with about three digits.
 pub fn rounded(value: f64) -> String {
     let size = value.abs();
     match size {
@@ -182,7 +189,7 @@ pub fn rounded(value: f64) -> String {
     }
 }
 
-/// A number with about three digits, without zeros at its end.
+/// Returns a number with about three digits, without trailing zeros.
 pub fn short(value: f64) -> String {
     let text = rounded(value);
     match text.contains('.') && !text.contains('e') {
@@ -191,17 +198,17 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// A count: whole where it is one.
+/// Returns a count, with a fraction only if it has one.
 pub fn counted(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e9 { format!("{value}") } else { rounded(value) }
 }
 
-/// A share as per cent.
+/// Returns a fraction in per cent.
 pub fn percent(share: f64) -> String {
     format!("{} %", rounded(100.0 * share))
 }
 
-/// A time with half of its range.
+/// Returns a time with half the width of its range.
 pub fn milliseconds(time: &Spread) -> String {
     match time.rounds {
         1 => format!("{} ms", rounded(time.median)),
@@ -218,7 +225,7 @@ pub fn listed(names: &[&str], word: &str) -> String {
     }
 }
 
-/// The names and a verb for one or for several.
+/// Returns the names with a verb in the singular or plural.
 pub fn listed_with(names: &[&str], one: &str, several: &str, word: &str) -> String {
     format!("{} {}", listed(names, word), if names.len() == 1 { one } else { several })
 }

@@ -1,5 +1,5 @@
-//! The folder of a report: `cost.json` with everything, `cost.csv` as a table, `index.html` to read, and pictures and scenes below it. Nothing
-//! stands half-written under its final name.
+//! Reads and writes the folder of a report: `cost.json` with all data, `cost.csv` as a table, `index.html`
+//! for reading, and the pictures and scenes. Every file is written under a temporary name first.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,42 +16,43 @@ use crate::picture::Picture;
 use crate::table::write_table;
 use crate::{CostError, CostReport, Point};
 
-/// The file that holds everything.
+/// Name of the file with all data.
 pub const REPORT: &str = "cost.json";
-/// The table.
+/// Name of the table.
 pub const TABLE: &str = "cost.csv";
-/// The page.
+/// Name of the page.
 pub const PAGE: &str = "index.html";
 
-/// The extension of the pictures that the page holds: a tenth of the bytes of the PNG files beside them.
+/// Extension of the pictures that are embedded in the page. They have a tenth of the size of the PNG files
+/// beside them.
 const IN_PAGE: &str = "page.jpg";
-/// Their quality, of 100: what it loses is less than the errors that are to be seen.
+/// Their JPEG quality, of 100. The loss is smaller than the errors that the pictures show.
 const QUALITY: u8 = 88;
 
-/// A report's folder.
+/// The folder of a report.
 #[derive(Clone, Debug)]
 pub struct Folder {
     path: PathBuf,
 }
 
 impl Folder {
-    /// Makes it if it is not there.
+    /// Opens a folder, and creates it if it does not exist.
     ///
     /// # Errors
     /// [`CostError::File`].
     pub fn open(path: &Path) -> Result<Self, CostError> {
         let failed = |source| CostError::File { path: path.to_owned(), source };
         fs::create_dir_all(path).map_err(failed)?;
-        // Commands and links are meant from here, wherever the program runs.
+        // Commands and links are relative to the folder, wherever the program runs.
         Ok(Self { path: path.canonicalize().map_err(failed)? })
     }
 
-    /// Where it is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The report that it holds, if it holds one.
+    /// Returns the report in the folder, or `None` if there is none.
     ///
     /// # Errors
     /// [`CostError::File`], [`CostError::NotAReport`].
@@ -60,7 +61,7 @@ impl Folder {
         if path.exists() { read_report(&path).map(Some) } else { Ok(None) }
     }
 
-    /// Writes a study's pictures, in place of those that are there from another time.
+    /// Writes the pictures of a study, replacing those of an earlier run.
     ///
     /// # Errors
     /// [`CostError::File`], [`CostError::Picture`].
@@ -71,7 +72,8 @@ impl Folder {
             fs::remove_dir_all(&own).map_err(failed)?;
         }
         fs::create_dir_all(&own).map_err(failed)?;
-        // What belongs together is shown with one exposure: that of the reference. Several points have the same reference, and that is one file.
+        // Pictures are shown with the exposure of their reference. Several points may share a reference,
+        // which is one file.
         let mut shown = BTreeMap::new();
         let points = measured.study.points.iter();
         for files in points.filter_map(|point| point.picture.as_ref()) {
@@ -92,11 +94,11 @@ impl Folder {
             }
             Ok(())
         };
-        // Compressing them takes longer than anything else here.
+        // Compressing the pictures takes longer than anything else here.
         measured.pictures.par_iter().try_for_each(|(name, picture)| write(name, picture))
     }
 
-    /// Writes the report, its table and its page.
+    /// Writes the report with its table and its page.
     ///
     /// # Errors
     /// [`CostError::File`], [`CostError::Table`], [`CostError::Plot`].
@@ -145,14 +147,14 @@ impl Folder {
         let beside = self.path.join(format!(".{}.{name}", std::process::id()));
         let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, &path));
         written.map_err(|source| {
-            // Half-written; if it cannot be removed either, the first error is the one to tell.
+            // The file is incomplete. If it cannot be removed either, the first error is the one to report.
             let _ = fs::remove_file(&beside);
             CostError::File { path, source }
         })
     }
 }
 
-/// Reads a report from its file, or from the folder that holds it.
+/// Reads a report from its file, or from the folder that contains it.
 ///
 /// # Errors
 /// [`CostError::File`], [`CostError::NotAReport`].
@@ -162,7 +164,7 @@ pub fn read_report(path: &Path) -> Result<CostReport, CostError> {
     serde_json::from_str(&text).map_err(|source| CostError::NotAReport { path, source })
 }
 
-/// Reads a picture of light that a report keeps, by the name that a point has for it.
+/// Reads the radiance of a picture of a report, by the name with which a point refers to it.
 ///
 /// # Errors
 /// [`CostError::Picture`].
@@ -173,7 +175,7 @@ pub fn read_picture(folder: &Path, name: &str) -> Result<Picture, CostError> {
     Ok(Picture { width: image.width() as usize, radiance })
 }
 
-/// Whether the pictures of a point are there.
+/// Returns true if the pictures of a point exist.
 pub fn has_pictures(folder: &Path, point: &Point) -> bool {
     let Some(files) = &point.picture else { return true };
     let (picture, heat, reference) = (&files.picture, &format!("{}.heat", files.picture), &files.reference);

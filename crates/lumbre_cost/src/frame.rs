@@ -1,59 +1,62 @@
-//! A scene, and how a frame of it is drawn, for its picture and for its time. Not the drawing.
+//! A scene with the options for drawing a frame of it.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bevy_ecs::world::World;
 use lumbre_render::{Display, FrameOptions, Measure};
 
-/// A scene, and how a frame of it is drawn.
+/// A scene with the options for drawing a frame of it.
 pub struct Frame {
-    /// The scene, perhaps of several frames.
+    /// The scene, which several frames may share.
     world: Arc<Mutex<World>>,
-    /// How it is drawn.
+    /// The options of the renderer.
     pub options: FrameOptions,
-    /// Frames of one name share a renderer, and with it what it has compiled, which takes longer than many a frame. Each is then drawn twice in a row, and the
-    /// second one timed: in the first the renderer reads another World. Without a name a frame has a renderer of its own.
+    /// The name of the renderer. Frames with the same name share a renderer and its compiled shaders, which
+    /// take longer to compile than many frames take to draw. Each such frame is drawn twice in a row and the
+    /// second drawing is timed, since in the first one the renderer reads another World. A frame without a
+    /// name has a renderer of its own.
     pub renderer: Option<&'static str>,
-    /// Before each frame that is timed every lamp that casts shadows moves by a hair and back again: no shadow map is as it was.
+    /// Whether every lamp that casts shadows moves slightly, alternately to and fro, before each timed frame,
+    /// so that no shadow map can be reused.
     pub moving_lamps: bool,
-    /// The lights that it evaluates are counted, by shader variants that are compiled for nothing else.
+    /// Whether light evaluations are counted, which needs shader variants of its own.
     pub counts_lights: bool,
 }
 
 impl Frame {
-    /// A frame with a renderer of its own.
+    /// Creates a frame with a renderer of its own.
     pub fn new(world: World, options: FrameOptions) -> Self {
         Self::of(&Arc::new(Mutex::new(world)), options)
     }
 
-    /// The same of a scene that other frames show, too.
+    /// Creates a frame of a scene that other frames show too.
     pub fn of(world: &Arc<Mutex<World>>, options: FrameOptions) -> Self {
         Self { world: Arc::clone(world), options, renderer: None, moving_lamps: false, counts_lights: false }
     }
 
-    /// Its scene, for whoever draws it next.
+    /// Locks the scene.
     pub fn world(&self) -> MutexGuard<'_, World> {
-        // Whoever panicked was drawing: the World is as whole as before.
+        // A thread that panicked was only drawing; the World is intact.
         self.world.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The same with a renderer in common with all that name it so.
+    /// Returns the frame with a renderer shared by all frames with this name.
     pub fn sharing(self, renderer: &'static str) -> Self {
         Self { renderer: Some(renderer), ..self }
     }
 
-    /// The same with its light evaluations counted, or not.
+    /// Returns the frame with its light evaluations counted or not.
     pub fn counting_lights(self, counts_lights: bool) -> Self {
         Self { counts_lights, ..self }
     }
 
-    /// The same with lamps that move.
+    /// Returns the frame with moving lamps.
     pub fn with_moving_lamps(self) -> Self {
         Self { moving_lamps: true, ..self }
     }
 }
 
-/// How the picture of a frame is drawn: in 32-bit floats and without exposure.
+/// Returns the options with which the picture of a frame is drawn: 32-bit floats, without exposure.
 pub fn picture_options(options: &FrameOptions) -> FrameOptions {
     FrameOptions {
         display: Display::Linear,

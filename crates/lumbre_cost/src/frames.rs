@@ -1,4 +1,4 @@
-//! Frames that are drawn again and again, side by side: their times, their counts, and the picture that each makes. Not the scenes.
+//! Draws frames repeatedly and alternately, for their times, their counts and their pictures.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -19,31 +19,33 @@ use crate::picture::Picture;
 use crate::rounds::{Work, in_rounds, milliseconds_since, warm_up};
 use crate::{Conditions, CostError, Spread};
 
-/// How far lamps move, in metres, and along which axis directional lights turn, by as many radians.
+/// Distance in metres by which lamps move, and angle in radians by which directional lights turn.
 const HAIR: f64 = 1e-4;
 
-/// What was measured of a frame.
+/// The measurements of a frame.
 pub struct DrawnFrame {
     /// Milliseconds of each round, from the call until the device has finished.
     pub times: Vec<f64>,
-    /// What it shows, in 32-bit floats and without exposure.
+    /// Its picture, in 32-bit floats and without exposure.
     pub picture: Picture,
-    /// Vertices and fragments that were shaded. How often a device shades a vertex that several triangles share, and whether it counts fragments that another one hides, is
-    /// its own affair: nothing where only that is counted which is the same everywhere.
+    /// Numbers of vertex and fragment invocations. How often a device shades a vertex that several triangles
+    /// share, and whether it counts hidden fragments, depends on the device: `None` if only counts that are
+    /// the same on all machines are wanted.
     pub invocations: Option<[u64; 2]>,
-    /// Lights that were evaluated at a vertex or fragment, and of these evaluations the ones that contributed something to be seen, where that was asked for and the device can count it.
+    /// Number of lights evaluated at vertices and fragments, and how many of these evaluations contributed
+    /// visibly; `None` if this was not requested or the device cannot count it.
     pub light_evaluations: Option<[u64; 2]>,
-    /// What the renderer says of it.
+    /// The renderer's statistics.
     pub statistics: Statistics,
 }
 
 impl DrawnFrame {
-    /// The median and the quartiles of its times.
+    /// Returns the median and the quartiles of its times.
     pub fn spread(&self) -> Option<Spread> {
         Spread::of(&self.times)
     }
 
-    /// Counts that do not depend on the hour.
+    /// Returns the counts that do not depend on when they are taken.
     pub fn counts(&self) -> BTreeMap<String, f64> {
         let of_device = self.invocations.map(|[vertices, fragments]| {
             [("vertex invocations", vertices as f64), ("fragment invocations", fragments as f64)]
@@ -61,8 +63,8 @@ impl DrawnFrame {
     }
 }
 
-/// Draws every frame once for its picture, and then all in turn for about `seconds` (see [`Conditions::rounds`]). `told` are the shares of the
-/// study that are done before and after.
+/// Draws every frame once for its picture, and then all of them in turn for about `seconds` seconds (see
+/// [`Conditions::rounds`]). `told` are the fractions of the study that are done before and after.
 ///
 /// # Errors
 /// [`CostError::Render`], [`CostError::Interrupted`].
@@ -97,13 +99,13 @@ pub fn draw_frames(
                 }
             };
             if frame.counts_lights && !conditions.counts_only {
-                // With a renderer of its own: what it compiles for this is for nothing else.
+                // The counting shader variants are not used for anything else.
                 let mut counting = conditions.pictures.borrow_mut();
                 found.light_evaluations = lights_of(conditions, &mut counting, &mut world, &frame.options)?;
             }
             drawn.push(found);
         }
-        // What was drawn for its picture is warm, unless other pipelines are timed.
+        // Frames that were drawn for their pictures are warm, unless they are timed with other pipelines.
         let cold = work.iter_mut().zip(&frames).enumerate();
         let cold = cold.filter(|(_, (_, frame))| conditions.as_shown || frame.renderer.is_none());
         for (number, (piece, _)) in cold {
@@ -120,7 +122,7 @@ pub fn draw_frames(
     Ok(drawn)
 }
 
-/// Sets it when it goes, whichever way.
+/// Sets the flag when it is dropped, also after an error or a panic.
 struct EndsWhenDropped<'a>(&'a AtomicBool);
 
 impl Drop for EndsWhenDropped<'_> {
@@ -129,7 +131,8 @@ impl Drop for EndsWhenDropped<'_> {
     }
 }
 
-/// Does something while shaders of the frames are compiled ahead, if a device is there to do that on; that has ended when this returns.
+/// Calls `draw` while the frames' shaders are compiled on a second device, if there is one. Compiling has
+/// ended when this returns.
 fn while_compiling_ahead<T>(
     conditions: &Conditions<'_>,
     frames: &[Frame],
@@ -142,7 +145,7 @@ fn while_compiling_ahead<T>(
             let (begun, end) = (&begun, &end);
             let drawings: &[Drawing] = match conditions.as_shown {
                 true => &[Drawing::Picture, Drawing::Timed],
-                // The same pipelines.
+                // Timed frames use the same pipelines.
                 false => &[Drawing::Picture],
             };
             scope.spawn(move || compile_ahead(gpu, size, frames, drawings, begun, end))
@@ -151,14 +154,14 @@ fn while_compiling_ahead<T>(
         let drawn = draw(&begun);
         drop(ending);
         if ahead.is_some_and(|ahead| ahead.join().is_err()) {
-            // The panic has said why. Shaders are compiled when they are needed.
+            // The panic has printed its message. The shaders are compiled when they are needed.
             tracing::debug!("what compiled ahead has panicked");
         }
         drawn
     })
 }
 
-/// The renderer of each frame, one for all that name the same.
+/// Returns the renderer of each frame; frames with the same name share one.
 fn renderers(conditions: &Conditions<'_>, frames: &[Frame]) -> Vec<Rc<RefCell<Renderer>>> {
     let mut shared: BTreeMap<&'static str, Rc<RefCell<Renderer>>> = BTreeMap::new();
     let new = || Rc::new(RefCell::new(Renderer::new(conditions.gpu)));
@@ -168,7 +171,7 @@ fn renderers(conditions: &Conditions<'_>, frames: &[Frame]) -> Vec<Rc<RefCell<Re
     frames.iter().map(of).collect()
 }
 
-/// What is timed of a frame.
+/// Returns the timed work of a frame.
 fn timed_work<'a>(
     conditions: &Conditions<'_>,
     (frame, number): (&'a Frame, usize),
@@ -180,7 +183,7 @@ fn timed_work<'a>(
         true => frame.options.clone(),
         false => picture_options(&frame.options),
     };
-    // Another frame's World was the last one that a shared renderer has read.
+    // A shared renderer has read the World of another frame before.
     let is_shared = frame.renderer.is_some();
     Box::new(move || {
         let mut renderer = renderers[number].borrow_mut();
@@ -199,7 +202,7 @@ fn timed_work<'a>(
     })
 }
 
-/// Milliseconds of a frame, from the call until the device has finished.
+/// Returns the milliseconds of a frame, from the call until the device has finished.
 fn timed_frame(
     renderer: &mut Renderer,
     world: &mut World,
@@ -212,7 +215,7 @@ fn timed_frame(
     Ok(milliseconds_since(begun))
 }
 
-/// Moves and turns every lamp that casts shadows.
+/// Moves or turns every lamp that casts shadows.
 fn move_lamps(world: &mut World, by: f64) {
     let mut lamps = world.query::<(&Light, &mut Transform)>();
     for (_, mut place) in lamps.iter_mut(world).filter(|(light, _)| light.shadow) {
@@ -249,7 +252,8 @@ fn picture_of(
     })
 }
 
-/// How many lights a frame evaluates, and how many of these evaluations contribute, by the shader variants that count them; nothing where the device cannot.
+/// Returns how many lights a frame evaluates, and how many of these evaluations contribute, as counted by
+/// shader variants; `None` if the device cannot count them.
 fn lights_of(
     conditions: &Conditions<'_>,
     renderer: &mut Renderer,
@@ -269,7 +273,7 @@ fn lights_of(
     }))
 }
 
-/// A frame for its picture alone.
+/// Draws a frame for its picture only.
 ///
 /// # Errors
 /// [`CostError::Render`].
@@ -333,7 +337,7 @@ mod tests {
         Ok(())
     }
 
-    /// Both clocks run over the same frames, so that what else the machine does meets both.
+    /// Both clocks run over the same frames, so that other load on the machine affects both.
     #[test]
     fn a_studys_time_is_that_of_the_frames_own_account() -> Result<(), CostError> {
         let gpu = Gpu::headless()?;
@@ -350,7 +354,7 @@ mod tests {
             apart.push((time / account - 1.0).abs());
         }
         apart.sort_by(f64::total_cmp);
-        // The median: the scheduler may take the thread away between one clock and the other.
+        // The median is compared, since the scheduler may interrupt the thread between the two clocks.
         assert!(apart[5] < 0.1, "{apart:?}");
         Ok(())
     }

@@ -1,14 +1,17 @@
-//! Which choice is the cheapest for an error that may be left: Pareto fronts, and the stretches of errors that one series wins. A claim is made
-//! only where the quartiles of the times lie apart. Not the sentences about it.
+//! Finds which choice is the cheapest for an error: Pareto fronts, and the ranges of errors in which a series
+//! is the cheapest. A series is only ruled out if the quartiles of the times do not overlap. The sentences
+//! about it are in `findings`.
 
 use crate::{ErrorOf, Point, Spread};
 
-/// The points that no other one beats in time and error at once, from the largest error to the smallest. Of equals the first. By medians and errors as they were found.
+/// Returns the points that no other point beats in both time and error, from the largest error to the
+/// smallest; the first of equal ones. Medians and errors are compared, without their uncertainty.
 pub fn pareto_front<'a>(points: impl IntoIterator<Item = &'a Point>) -> Vec<&'a Point> {
     front_of(points, |point| Some((point.milliseconds?.median, point.error?.relative_rmse)))
 }
 
-/// The points that no other one beats in two numbers at once, of which less is better, from the least of the first to the least of the second. Of equals the first.
+/// Returns the points that no other point beats in two numbers of which less is better, ordered by the first
+/// number; the first of equal ones.
 pub fn front_of<'a>(
     points: impl IntoIterator<Item = &'a Point>,
     numbers: impl Fn(&Point) -> Option<(f64, f64)>,
@@ -17,7 +20,7 @@ pub fn front_of<'a>(
         .into_iter()
         .filter_map(|point| numbers(point).map(|(first, second)| (point, first, second)))
         .collect();
-    // From the cheapest on, each has to be better than all before it.
+    // From the cheapest point on, each has to be better than all before it.
     known.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
     let mut least = f64::INFINITY;
     known.retain(|(.., second)| {
@@ -28,22 +31,27 @@ pub fn front_of<'a>(
     known.into_iter().map(|(point, ..)| point).collect()
 }
 
-/// Who is the cheapest within a range of errors that may be left.
+/// The cheapest choices within a range of errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch<'a> {
-    /// Errors from here …
+    /// The smallest error of the range.
     pub from: f64,
-    /// … up to here, which is in the next stretch; infinite in the last.
+    /// The end of the range, which belongs to the next one; infinite for the last.
     pub to: f64,
-    /// The cheapest point of each series that may be the cheapest: one where the measurements decide, several where they do not. By their medians.
+    /// The cheapest point of each series that may be the cheapest, ordered by median: one if the measurements
+    /// decide, several if they do not.
     pub cheapest: Vec<&'a Point>,
-    /// Some of them are among these only because the reference leaves open whether they reach the error.
+    /// Whether some of these are included only because the reference leaves open whether they reach the
+    /// error.
     pub by_error: bool,
 }
 
-/// Walks from the smallest error that any point reaches to the largest, and says who gets there in the least time. A series gets to an error by
-/// its cheapest point whose error is at most that. A point whose error may be as small, for all that its reference leaves open, is not ruled out either, if its time does not rule it out. Next to each
-/// other stand stretches that different series win.
+/// Returns the cheapest choices for every error, from the smallest error that any point reaches to the
+/// largest.
+///
+/// A series reaches an error by its cheapest point whose error is at most that. A point that may reach the
+/// error, given the uncertainty of the reference, is included too unless its time rules it out. Adjacent
+/// ranges have different winners.
 pub fn stretches<'a>(points: &[&'a Point]) -> Vec<Stretch<'a>> {
     let mut known: Vec<(&Point, ErrorOf, Spread)> =
         points.iter().filter_map(|point| Some((*point, point.error?, point.milliseconds?))).collect();

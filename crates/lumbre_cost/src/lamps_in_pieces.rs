@@ -1,4 +1,5 @@
-//! Lamps that have a size as many small ones without: what rays from their middles then add up to is a soft shadow, without noise. Not the rays.
+//! Replaces lamps that have a size by many small ones without, for a reference picture: rays to the centres
+//! of the small lamps add up to a soft shadow without noise.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -7,7 +8,8 @@ use glam::{DQuat, DVec3};
 use lumbre_optics::{Light, LightKind};
 use lumbre_scene::{GlobalTransform, Transform, update_transforms};
 
-/// Replaces each lamp that has a size and a shadow by so many without a size that share its light. How many lamps were replaced. Global transforms must be up to date.
+/// Replaces each lamp that has a size and casts a shadow by `pieces` lamps without a size that share its
+/// light, and returns how many lamps were replaced. Global transforms must be up to date.
 pub fn take_to_pieces(world: &mut World, pieces: u32) -> usize {
     let mut lamps = world.query::<(Entity, &Light, &GlobalTransform)>();
     let has_size = |light: &Light| match light.kind {
@@ -50,7 +52,8 @@ pub fn take_to_pieces(world: &mut World, pieces: u32) -> usize {
     found.len()
 }
 
-/// A direction of a distant disc of this angular diameter, as the turn from its middle: Vogel's spiral, of even density.
+/// Returns the rotation from the centre of a distant disc with this angular diameter to one of `of` points of
+/// Vogel's spiral, which has uniform density.
 fn in_disc(number: u32, of: u32, diameter: f64) -> DQuat {
     let part = (f64::from(number) + 0.5) / f64::from(of);
     let (radius, around) = ((0.5 * diameter).tan() * part.sqrt(), f64::from(number) * GOLDEN_ANGLE);
@@ -58,17 +61,19 @@ fn in_disc(number: u32, of: u32, diameter: f64) -> DQuat {
     DQuat::from_rotation_arc(DVec3::NEG_Z, direction)
 }
 
-/// A point of a ball of radius 1 that looks from everywhere like a disc of even brightness, as a sphere does that shines evenly: the density at ρ is proportional to
-/// 1/√(1 - ρ²), whose integral along any line through the ball is π (Abel's transform of a disc).
+/// Returns a point in the unit ball. The points' density at the distance ρ from the centre is proportional to
+/// 1/√(1 - ρ²), whose integral along any line through the ball is π (Abel's transform of a disc). From every
+/// direction they look like a disc of uniform brightness, as a uniformly shining sphere does.
 fn in_ball(number: u32, of: u32) -> DVec3 {
     let height = 1.0 - 2.0 * (f64::from(number) + 0.5) / f64::from(of);
     let (side, around) = ((1.0 - height * height).sqrt(), f64::from(number) * GOLDEN_ANGLE);
-    // Van der Corput's sequence: radii that have nothing to do with the heights.
+    // Van der Corput's sequence makes the radii independent of the heights.
     let part = (f64::from(number.reverse_bits()) + 0.5) / 2f64.powi(32);
     distance_within(part) * DVec3::new(side * around.cos(), side * around.sin(), height)
 }
 
-/// The ρ within which a part of that density lies: (2/π) (asin ρ - ρ √(1 - ρ²)), solved by halving.
+/// Returns the ρ within which a fraction of the points lies. The fraction is (2/π) (asin ρ - ρ √(1 - ρ²)),
+/// inverted by bisection.
 fn distance_within(part: f64) -> f64 {
     // With ρ = sin t it is (2/π) (t - sin t cos t).
     let (mut low, mut high) = (0.0, FRAC_PI_2);
@@ -83,14 +88,15 @@ fn distance_within(part: f64) -> f64 {
     (0.5 * (low + high)).sin()
 }
 
-/// Radians from one point of a sunflower to the next.
+/// The golden angle in radians.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Seen along any axis, the part of the points within a distance r of the axis is r², as of an even disc.
+    /// Seen along any axis, the fraction of points within a distance r of the axis is r², as in a uniform
+    /// disc.
     #[test]
     fn a_ball_of_points_looks_like_an_even_disc_from_everywhere() {
         let points: Vec<DVec3> = (0..4096).map(|number| in_ball(number, 4096)).collect();

@@ -1,5 +1,5 @@
-//! What accuracy costs in time: studies that measure milliseconds and error of the same choice, side by side, and the page that shows them. Not
-//! the command line, and nothing that draws or bakes: that is measured here.
+//! Measures what accuracy costs in time: studies that measure the time and the error of the same choices, and the page that
+//! shows the results.
 //!
 //! ```text
 //!   files, or scenes ─► studies/… ─► Measured: Study (points, findings) + pictures
@@ -10,9 +10,10 @@
 //!                                                                   └─► comparison: two reports, what changed
 //! ```
 //!
-//! - A [`Point`] has a time (median and quartiles over interleaved rounds), an error against the study's reference, counts that do not depend
-//!   on the hour, the command that makes it again, and its picture.
-//! - Findings are worked out from the points; where the quartiles of two times overlap they say that it is not decided.
+//! - A [`Point`] has a time (median and quartiles over rounds in which all points take turns), an error against the
+//!   reference of its study, counts that do not depend on when they are taken, the command that reproduces it, and a picture.
+//! - Findings are derived from the points. If the quartiles of two times overlap, they say that the times are not
+//!   distinguishable.
 //!
 //! ```
 //! use lumbre_cost::{CostReport, Point, Spread, Study, compare_reports};

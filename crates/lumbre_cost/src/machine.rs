@@ -1,10 +1,10 @@
-//! What a report was measured on.
+//! Describes the machine that a report is measured on.
 
 use lumbre_render::Gpu;
 
 use crate::Machine;
 
-/// This machine with this device.
+/// Returns the description of this machine with this device.
 pub fn machine(gpu: &Gpu) -> Machine {
     let optimized = if cfg!(debug_assertions) { "development profile" } else { "release profile" };
     Machine {
@@ -16,7 +16,8 @@ pub fn machine(gpu: &Gpu) -> Machine {
     }
 }
 
-/// The processor's name where the system tells it in a file, as Linux does; its architecture elsewhere.
+/// Returns the name of the processor if the system states it in a file, as Linux does, and its architecture
+/// otherwise.
 fn processor() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let named = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));

@@ -1,31 +1,31 @@
-//! What a study hands over: the study as data, and the pictures that its points name. Not their files.
+//! The result of a study: its data, and the pictures that its points refer to. Files are written by `folder`.
 
 use std::collections::BTreeMap;
 
 use crate::picture::{Compared, Picture, compared};
 use crate::{CostError, ErrorOf, ErrorOver, KeptMaps, Point, PointPicture, Study};
 
-/// A study that is finished.
+/// A finished study.
 #[derive(Clone, Debug, Default)]
 pub struct Measured {
     /// The study.
     pub study: Study,
-    /// Its pictures and references, by the names that its points have for them.
+    /// Pictures and references, by the names with which points refer to them.
     pub pictures: BTreeMap<String, Picture>,
-    /// Where a picture differs from its reference: FLIP of every pixel, by the name of the picture.
+    /// FLIP of every pixel against the reference, by the name of the picture.
     pub heat: BTreeMap<String, Vec<f64>>,
 }
 
 impl Measured {
-    /// Keeps a reference picture; points name it by what is returned.
+    /// Keeps a reference picture, and returns the name by which points refer to it.
     pub fn keep_reference(&mut self, name: &str, picture: Picture) -> String {
         let name = self.file_name(name);
         self.pictures.insert(name.clone(), picture);
         name
     }
 
-    /// Adds a point with its picture. The error is that of the picture against a reference that was kept, unless the point has one of something
-    /// that the picture only shows.
+    /// Adds a point with its picture. Its error is computed from the picture and a kept reference, unless
+    /// `error_of` says that the point already has an error of something that the picture only shows.
     ///
     /// # Errors
     /// [`CostError::Sizes`], [`CostError::NotFinite`].
@@ -50,7 +50,8 @@ impl Measured {
         Ok(())
     }
 
-    /// Adds a point whose error is of lightmaps, with a frame that shows them. Both pairs are kept.
+    /// Adds a point whose error is one of lightmaps, with a frame that shows them. The lightmaps and the
+    /// frame are both kept, along with their references.
     ///
     /// # Errors
     /// [`CostError::Sizes`], [`CostError::NotFinite`].
@@ -78,7 +79,7 @@ impl Measured {
         checked(&self.study, point, wanted.and_then(|wanted| compared(wanted, picture, over)))
     }
 
-    /// Below `pictures/STUDY`, of letters, digits and hyphens.
+    /// Returns the path of a picture below `pictures/STUDY`, reduced to letters, digits and hyphens.
     pub fn file_name(&self, name: &str) -> String {
         let mut plain = String::new();
         for c in name.to_lowercase().chars() {
@@ -92,7 +93,8 @@ impl Measured {
     }
 }
 
-/// What a comparison found, if it compared pictures of one size and numbers.
+/// Returns the result of a comparison, or an error if the pictures differ in size or hold values that are not
+/// finite.
 fn checked(study: &Study, point: &Point, found: Option<Compared>) -> Result<Compared, CostError> {
     let named = || format!("{}, {}", point.series, point.label);
     let found = found.ok_or_else(|| CostError::Sizes { point: named() })?;

@@ -1,4 +1,4 @@
-//! Pictures of light, and how far one is from another. Not their drawing.
+//! Pictures of radiance, and their comparison with references.
 
 use glam::DVec3;
 use lumbre_trace::{Metering, compare, shown};
@@ -8,48 +8,50 @@ use crate::{ErrorOf, ErrorOver};
 /// Radiance of every pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Columns.
+    /// Width in pixels.
     pub width: usize,
     /// Linear RGB, W/(m² sr), top row first.
     pub radiance: Vec<DVec3>,
 }
 
-/// A picture against its reference.
+/// The result of comparing a picture with its reference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compared {
-    /// How far it is.
+    /// The differences of the whole picture.
     pub error: ErrorOf,
     /// FLIP of every pixel, top row first.
     pub heat: Vec<f64>,
 }
 
-/// Share of what is lit that has to be white before an exposure is metered.
+/// Fraction of the lit pixels that has to be clipped to white before an exposure is metered.
 const CLIPPED: f64 = 0.02;
 
 impl Picture {
-    /// Rows.
+    /// Returns the height in pixels.
     pub fn height(&self) -> usize {
         self.radiance.len() / self.width.max(1)
     }
 
-    /// The factor on radiance that it is shown with: 1, unless too much of it would be white.
+    /// Returns the factor on radiance with which it is displayed: 1, unless too many pixels would be clipped.
     pub fn exposure(&self) -> f64 {
         let metering = Metering::of(&self.radiance).filter(|found| found.clipped > CLIPPED);
         metering.map_or(1.0, |found| f64::from(found.exposure))
     }
 
-    /// Colours as they are shown with that exposure: tone curve and sRGB's encoding, each channel in [0, 1].
+    /// Returns the displayed colours with an exposure: tone curve and sRGB encoding, with each channel in [0,
+    /// 1].
     pub fn shown(&self, exposure: f64) -> Vec<DVec3> {
         self.radiance.iter().map(|pixel| shown(*pixel * exposure)).collect()
     }
 }
 
-/// How far a picture is from its reference, both shown with the reference's exposure. Nothing if the sizes differ.
+/// Compares a picture with its reference, both displayed with the reference's exposure. `None` if the sizes
+/// differ.
 pub fn compared(reference: &Picture, picture: &Picture, over: ErrorOver) -> Option<Compared> {
     compared_at(reference, picture, over, reference.exposure())
 }
 
-/// How far a picture is from its reference, both shown with this exposure. Nothing if the sizes differ.
+/// Compares a picture with its reference, both displayed with this exposure. `None` if the sizes differ.
 pub fn compared_at(
     reference: &Picture,
     picture: &Picture,

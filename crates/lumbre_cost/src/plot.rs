@@ -1,4 +1,4 @@
-//! A study's numbers over a pair of axes, both logarithmic, as SVG that takes its colours from the page around it. Not the page.
+//! Draws plots with logarithmic axes as SVG. Colours are those of the page's style sheet.
 
 use maud::{Markup, html};
 use plotters::coord::Shift;
@@ -9,7 +9,7 @@ use crate::findings::{cost_of, counted, rounded};
 use crate::fronts::front_of;
 use crate::{CostError, Plot, Point, Quantity, Study};
 
-/// How large a plot is drawn, in pixels: text keeps its size, so that phones get drawings of their own.
+/// The size of a plot. Text keeps its size in pixels, so that phones need drawings of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlotSize {
     /// For screens and paper.
@@ -27,11 +27,11 @@ impl PlotSize {
     }
 }
 
-/// Colours that stand for the page's own: the drawing has numbers, the page replaces them by names of its style sheet.
+/// Placeholders in the drawing for the colours of the page's style sheet.
 const INK: RGBColor = RGBColor(1, 2, 3);
 const GRID: RGBColor = RGBColor(1, 2, 4);
 const FRONT: RGBColor = RGBColor(1, 2, 5);
-/// Series have as many colours, then they begin again.
+/// Number of colours for series; further series reuse them.
 pub const SERIES_COLORS: usize = 7;
 
 fn series_color(series: usize) -> RGBColor {
@@ -39,22 +39,23 @@ fn series_color(series: usize) -> RGBColor {
 }
 
 const FONT: u32 = 13;
-/// Radius of a mark.
+/// Radius of a mark in pixels.
 const MARK: i32 = 4;
 
-/// Where a point's mark stands in a drawing.
+/// The position of a point's mark in a drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Mark {
-    /// The point's place in its study.
+    /// Index of the point in its study.
     point: usize,
-    /// In pixels of the drawing.
+    /// Position in pixels.
     at: (i32, i32),
 }
 
-/// Radius of what answers to a pointer or a finger around a mark, in pixels of the drawing.
+/// Radius in pixels around a mark that reacts to pointers and fingers.
 const REACH: i32 = 11;
 
-/// Draws it. Around every mark lies an invisible one that answers to pointers, fingers and the keyboard, and says which point it is.
+/// Draws a plot. An invisible circle around every mark reacts to pointers, fingers and the keyboard, and
+/// holds the point's details.
 ///
 /// # Errors
 /// [`CostError::Plot`].
@@ -77,7 +78,7 @@ pub fn draw_plot(study: &Study, plot: &Plot, size: PlotSize) -> Result<String, C
     })
 }
 
-/// What answers around marks.
+/// Returns the invisible circles around marks.
 fn answering(study: &Study, marks: &[Mark]) -> Markup {
     html! {
         @for mark in marks {
@@ -89,7 +90,7 @@ fn answering(study: &Study, marks: &[Mark]) -> Markup {
     }
 }
 
-/// What there is to say of a point, a line each.
+/// Returns a point's details, one per line.
 fn details_of(point: &Point) -> String {
     let numbers = point.parameters.iter().chain(&point.figures).chain(&point.counts);
     let flip = point.error.and_then(|error| error.flip).map(|flip| format!("FLIP: {}", rounded(flip)));
@@ -98,7 +99,7 @@ fn details_of(point: &Point) -> String {
     lines.filter(|line| !line.is_empty()).collect::<Vec<_>>().join("\n")
 }
 
-/// The series that a plot draws, with their places in the study's list, which their colours follow.
+/// Returns the series that a plot draws, with their indices in the study, which determine their colours.
 pub fn drawn_series<'a>(study: &'a Study, plot: &Plot) -> Vec<(usize, &'a str)> {
     let has_numbers = |series: &str| study.of_series(series).any(|point| place(plot, point).is_some());
     let wanted = |series: &str| plot.series.is_empty() || plot.series.iter().any(|name| name == series);
@@ -106,7 +107,7 @@ pub fn drawn_series<'a>(study: &'a Study, plot: &Plot) -> Vec<(usize, &'a str)> 
     all.filter(|(_, series)| wanted(series) && has_numbers(series)).collect()
 }
 
-/// A point's two numbers as they are written, if it has both.
+/// Returns a point's two values as displayed, if it has both.
 fn place(plot: &Plot, point: &Point) -> Option<(f64, f64)> {
     let (across, up) = (plot.across.of(point)? * plot.across.shown(), plot.up.of(point)? * plot.up.shown());
     (across.is_finite() && up.is_finite() && across >= 0.0 && up >= 0.0).then_some((across, up))
@@ -165,7 +166,7 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<V
     let corners: Vec<(f64, f64)> = front.iter().filter_map(|point| place(plot, point)).map(onto).collect();
     let steps: Vec<(f64, f64)> =
         corners.iter().zip(corners.iter().skip(1)).flat_map(|(a, b)| [*a, (b.0, a.1), *b]).collect();
-    // Names are not to lie over lines.
+    // Labels must not cover lines.
     let mut lines = vec![steps.clone()];
     chart.draw_series(DashedLineSeries::new(steps, 4, 4, FRONT.stroke_width(1))).map_err(told)?;
     if plot.equal {
@@ -186,7 +187,7 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<V
             lines.push(line.clone());
             chart.draw_series(LineSeries::new(line, style.stroke_width(2))).map_err(told)?;
         }
-        // Quartiles of times, where they are wider than the mark.
+        // The quartiles of times.
         for (_, point, at) in own() {
             let Some(time) = point.milliseconds else { continue };
             let ends = match (&plot.across, &plot.up) {
@@ -220,7 +221,7 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<V
     Ok(marks)
 }
 
-/// Small boxes along a line of pixels.
+/// Returns small boxes along a line.
 fn along(line: &[(i32, i32)]) -> Vec<[i32; 4]> {
     let mut boxes = Vec::new();
     for ((x, y), (to_x, to_y)) in line.iter().zip(line.iter().skip(1)) {
@@ -233,7 +234,7 @@ fn along(line: &[(i32, i32)]) -> Vec<[i32; 4]> {
     boxes
 }
 
-/// A number across with the quartiles of its time.
+/// Returns a horizontal value together with the quartiles of its time.
 fn reach(across: &Quantity, point: &Point, at: f64) -> Vec<f64> {
     match (across, point.milliseconds) {
         (Quantity::Milliseconds, Some(time)) => vec![time.lower, at, time.upper],
@@ -241,7 +242,7 @@ fn reach(across: &Quantity, point: &Point, at: f64) -> Vec<f64> {
     }
 }
 
-/// A mark: shapes differ as well as colours, for whoever sees no colours and for print.
+/// Draws a mark. Series differ in shape as well as in colour, for colour-blind readers and for print.
 fn mark(
     root: &Area<'_>,
     series: usize,
@@ -257,7 +258,7 @@ fn mark(
     }
 }
 
-/// Where a name may stand without lying over another or a mark.
+/// The position of a label that covers no other label and no mark.
 struct Label {
     start: (i32, i32),
     extent: [i32; 4],
@@ -270,7 +271,7 @@ impl Label {
         (width, height): (u32, u32),
         taken: &[[i32; 4]],
     ) -> Option<Self> {
-        // Of a proportional font nothing is known here: a wide guess.
+        // The width of the text is not known here; this estimate is generous.
         let long = (text.chars().count() as f64 * 0.56 * f64::from(FONT)).ceil() as i32;
         let high = FONT as i32;
         let starts = [
@@ -304,7 +305,7 @@ impl Label {
     }
 }
 
-/// A logarithmic axis: its ends and where lines and numbers stand.
+/// A logarithmic axis with its range and its ticks.
 #[derive(Clone, Debug, PartialEq)]
 struct Axis {
     from: f64,
@@ -312,20 +313,21 @@ struct Axis {
     ticks: Vec<f64>,
 }
 
-/// Air beyond the outermost numbers, as a factor.
+/// Margin beyond the outermost values, as a factor.
 const AIR: f64 = 1.3;
-/// Numbers below this part of the largest stand on the axis' end.
-const SMALLEST_PART: f64 = 1e-9;
+/// Values smaller than this fraction of the largest are drawn at the end of the axis.
+const MIN_FRACTION: f64 = 1e-9;
 
 impl Axis {
-    /// Around some numbers, with at most so many ticks; numbers that are 0 stand on its lower end.
+    /// Returns an axis for some values with at most `most` ticks. Values that are 0 are drawn at its lower
+    /// end.
     fn of(numbers: impl Iterator<Item = f64>, most: usize) -> Self {
         let numbers: Vec<f64> = numbers.collect();
         let largest = numbers.iter().copied().fold(0.0, f64::max);
         let largest = if largest > 0.0 { largest } else { 1.0 };
-        let above = numbers.iter().copied().filter(|number| *number > largest * SMALLEST_PART);
+        let above = numbers.iter().copied().filter(|number| *number > largest * MIN_FRACTION);
         let smallest = above.fold(largest, f64::min);
-        let below = numbers.iter().any(|number| *number <= largest * SMALLEST_PART);
+        let below = numbers.iter().any(|number| *number <= largest * MIN_FRACTION);
         let (mut from, mut to) = (smallest / if below { 4.0 } else { AIR }, largest * AIR);
         if to / from < 3.0 {
             let middle = (from * to).sqrt();
@@ -335,14 +337,14 @@ impl Axis {
     }
 }
 
-/// Powers of ten and round parts of them within a range: as many as fit.
+/// Returns powers of ten and round multiples of them within a range, as many as fit.
 fn ticks(from: f64, to: f64, most: usize) -> Vec<f64> {
     let powers = || from.log10().floor() as i32..=to.log10().ceil() as i32;
     let with = |digits: &[u32], every: i32| -> Vec<f64> {
         powers()
             .filter(|power| power % every == 0)
             .flat_map(|power| digits.iter().map(move |digit| format!("{digit}e{power}")))
-            // Read from decimals, a tick is the number that it is written as.
+            // Parsed from decimals, a tick is exactly the number that its label shows.
             .filter_map(|text| text.parse::<f64>().ok())
             .filter(|tick| (from..=to).contains(tick))
             .collect()

@@ -1,5 +1,5 @@
-//! What a report is made of: studies, each of points that have a time, an error and counts. Plain data, kept as JSON; not its measuring and
-//! not its drawing.
+//! The data of a report: studies consisting of points, each with a time, an error and counts. It is stored as
+//! JSON. Measuring is in `studies`, drawing in `page`.
 
 use std::collections::BTreeMap;
 
@@ -7,169 +7,176 @@ use serde::{Deserialize, Serialize};
 
 use crate::Spread;
 
-/// Studies of one machine.
+/// The studies measured on one machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CostReport {
-    /// What they were measured on.
+    /// The machine they were measured on.
     pub machine: Machine,
-    /// How they were measured.
+    /// The settings they were measured with.
     pub settings: Settings,
-    /// The studies that are finished, in their order.
+    /// The finished studies, in the order of the page.
     pub studies: Vec<Study>,
 }
 
-/// A machine: times mean little without it.
+/// A machine. Times can only be compared between reports from the same machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
-    /// The processor, as the system names it.
+    /// Name of the processor, as the operating system reports it.
     pub processor: String,
-    /// Threads that the process may use.
+    /// Number of threads available to the process.
     pub threads: usize,
     /// Operating system and architecture.
     pub system: String,
-    /// The GPU, or the software in its place, with its driver.
+    /// The GPU or software rasterizer, with its driver.
     pub adapter: String,
-    /// Of Lumbre, and whether it was optimized.
+    /// Version of Lumbre, and whether it was built with optimizations.
     pub version: String,
 }
 
-/// How a report was measured; reports with other settings hold other numbers.
+/// The settings of a report. Numbers of reports with different settings cannot be compared.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// Fewer points and rounds.
+    /// Whether it was measured with fewer points and rounds.
     pub quick: bool,
-    /// Nothing but counts.
+    /// Whether only counts were recorded.
     #[serde(default)]
     pub counts_only: bool,
     /// Width and height of the pictures in pixels.
     pub size: (u32, u32),
-    /// Of everything that draws random numbers.
+    /// Seed of all random numbers.
     pub seed: u32,
-    /// The scenes that were given; without any the studies make their own.
+    /// The scene files that were passed; if there are none, the studies create their own scenes.
     pub files: Vec<String>,
 }
 
-/// One question, and what was measured about it.
+/// A question, and the measurements that answer it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Study {
-    /// The name on the command line.
+    /// Its name on the command line.
     pub name: String,
-    /// A headline.
+    /// Its headline.
     pub title: String,
-    /// What was asked, in a sentence or two.
+    /// The question, in a sentence or two.
     pub question: String,
-    /// What errors are against.
+    /// The reference that errors are measured against.
     pub reference: String,
-    /// What is drawn, each over a pair of axes.
+    /// The plots to be drawn.
     pub plots: Vec<Plot>,
-    /// What was measured.
+    /// The measurements.
     pub points: Vec<Point>,
-    /// What was found, a sentence each, worked out from the points.
+    /// What was found: sentences derived from the points.
     pub findings: Vec<String>,
-    /// What was left out, and why.
+    /// What was left out, and why; and other remarks.
     pub notes: Vec<String>,
-    /// Seconds that the study took.
+    /// Duration of the study in seconds.
     pub seconds: f64,
-    /// Which way of measuring it was ([`StudyKind::method`](crate::StudyKind)); 0 where a report does not say so.
+    /// Version of the way of measuring ([`StudyKind::method`](crate::StudyKind)); 0 if the report does not
+    /// state it.
     #[serde(default)]
     pub method: u32,
-    /// The program that measured it.
+    /// Version of the program that measured it.
     #[serde(default)]
     pub version: String,
 }
 
-/// A choice, with what it costs and how far it is from the reference.
+/// One measured choice, with its cost and its error against the reference.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// What it has in common with the points that it is joined to.
+    /// Name of its series; the points of a series may be joined by a line.
     pub series: String,
-    /// What tells it from the others of its series. The two together name it within its study.
+    /// What distinguishes it from the other points of its series. Series and label together identify a point
+    /// within its study.
     pub label: String,
-    /// What was varied, by quantity.
+    /// The values that were varied, by quantity.
     pub parameters: BTreeMap<String, f64>,
-    /// The time of it.
+    /// Its time.
     pub milliseconds: Option<Spread>,
-    /// How far it is from the reference.
+    /// Its error against the reference.
     pub error: Option<ErrorOf>,
-    /// What does not depend on the hour: invocations, lights, rays, bytes.
+    /// Counts that do not depend on when they are taken: shader invocations, lights, rays, bytes.
     pub counts: BTreeMap<String, f64>,
-    /// Other numbers, by what they are.
+    /// Other numbers, by name.
     pub figures: BTreeMap<String, f64>,
-    /// The command that makes it again, in the folder of the report.
+    /// The command that reproduces it, to be run in the report's folder.
     pub command: String,
     /// Its picture, if it has one.
     pub picture: Option<PointPicture>,
 }
 
-/// How far something is from its reference.
+/// The difference from a reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorOf {
-    /// Root mean square of the difference over that of the reference; of lightmaps over the reference's mean, as bakes state it.
+    /// Root mean square of the difference divided by that of the reference. For lightmaps it is divided by
+    /// the reference's mean, as in the error that a bake states.
     pub relative_rmse: f64,
-    /// Largest difference of a channel, in the unit of what is compared.
+    /// Largest difference of a channel, in the unit of the compared values.
     pub largest: f64,
-    /// Mean of FLIP (0 to 1) where it is a picture.
+    /// Mean of FLIP, from 0 to 1, for pictures.
     pub flip: Option<f64>,
-    /// Of the relative RMSE, what the reference's own error may make of it: plus or minus so much.
+    /// By how much the relative RMSE may be off, in either direction, because the reference itself has an
+    /// error.
     pub uncertainty: f64,
 }
 
-/// Files of a point's picture, below the folder of the report. `.exr` holds light; `.png`, as it is shown; and `.heat.png`, where it differs.
+/// The files of a point's picture, relative to the report's folder. `.exr` holds radiance, `.png` the picture
+/// as displayed, and `.heat.png` a map of the differences from the reference.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointPicture {
-    /// The picture, without its extension.
+    /// Path of the picture, without extension.
     pub picture: String,
-    /// The reference, without its extension.
+    /// Path of the reference, without extension.
     pub reference: String,
-    /// What of it the point's error is.
+    /// What the point's error was computed from.
     pub error_of: ErrorOver,
-    /// Where the error is of lightmaps: their texels, which have no picture to be shown.
+    /// The texels that the error was computed from, if it is an error of lightmaps.
     #[serde(default)]
     pub maps: Option<KeptMaps>,
 }
 
-/// Files of lightmaps, below the folder of the report, as `.exr`: the texels of all maps of a level one after the other, not a number where a texel shows no surface.
+/// The texels of lightmaps, as `.exr` files relative to the report's folder: those of all maps of a level one
+/// after the other, NaN where a texel shows no surface.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KeptMaps {
-    /// Those of the point, without the extension.
+    /// Path of the point's texels, without extension.
     pub picture: String,
-    /// Those that they are compared with.
+    /// Path of the reference's texels, without extension.
     pub reference: String,
 }
 
-/// What a point's relative RMSE and largest difference are of. FLIP is of the whole picture always.
+/// The pixels that a point's relative RMSE and largest difference are computed from. FLIP always covers the
+/// whole picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorOver {
     /// All pixels.
     #[default]
     Picture,
-    /// Pixels that are not black in either picture: what a shape lacks at its rim does not count.
+    /// Pixels that are not black in either of the two pictures. Missing pixels at a silhouette do not count.
     WhereBothAreLit,
-    /// Something that the picture only shows: the texels of a lightmap.
+    /// The error is not one of the picture, but of something that the picture shows: the texels of lightmaps.
     Beyond,
 }
 
-/// A pair of axes.
+/// A plot: a pair of axes and what is drawn over them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plot {
-    /// What it shows.
+    /// Its title.
     pub title: String,
-    /// To the right.
+    /// The quantity of the horizontal axis.
     pub across: Quantity,
-    /// Upwards.
+    /// The quantity of the vertical axis.
     pub up: Quantity,
-    /// Series that are drawn; all of them if empty.
+    /// The series to be drawn; all of them if empty.
     pub series: Vec<String>,
-    /// Points of a series are joined by a line, in the order of the quantity across.
+    /// Whether the points of a series are joined by a line, ordered by the horizontal quantity.
     pub joined: bool,
-    /// Those points are marked that no other one beats in both quantities.
+    /// Whether the points that no other point beats in both quantities are marked.
     pub front: bool,
-    /// A line marks where both quantities are equal.
+    /// Whether a line marks where both quantities are equal.
     pub equal: bool,
 }
 
-/// What an axis measures.
+/// The quantity that an axis shows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
@@ -180,16 +187,16 @@ pub enum Quantity {
     Error,
     /// Mean of FLIP.
     Flip,
-    /// A parameter of that name, with its unit.
+    /// The parameter with this name, which includes its unit.
     Parameter(String),
-    /// A figure of that name, with its unit.
+    /// The figure with this name, which includes its unit.
     Figure(String),
-    /// A count of that name.
+    /// The count with this name.
     Count(String),
 }
 
 impl Quantity {
-    /// A point's number; nothing where it has none.
+    /// Returns the value of a point, or `None` if the point has no such value.
     pub fn of(&self, point: &Point) -> Option<f64> {
         match self {
             Self::Milliseconds => point.milliseconds.map(|time| time.median),
@@ -201,7 +208,7 @@ impl Quantity {
         }
     }
 
-    /// What is written beside its axis.
+    /// Returns the title of an axis with this quantity.
     pub fn title(&self) -> &str {
         match self {
             Self::Milliseconds => "time, ms",
@@ -211,14 +218,14 @@ impl Quantity {
         }
     }
 
-    /// The factor from its numbers to those that are written.
+    /// Returns the factor from stored to displayed values.
     pub fn shown(&self) -> f64 {
         if *self == Self::Error { 100.0 } else { 1.0 }
     }
 }
 
 impl Study {
-    /// Its series, in the order in which they come.
+    /// Returns the names of its series, in order of first occurrence.
     pub fn series(&self) -> Vec<&str> {
         let mut series: Vec<&str> = Vec::new();
         for point in &self.points {
@@ -229,7 +236,7 @@ impl Study {
         series
     }
 
-    /// Its points with nothing but what was varied and counted. Those of which nothing was counted are left out.
+    /// Reduces its points to what was varied and counted. Points without counts are dropped.
     pub fn counts_alone(self) -> Self {
         let counted = self.points.into_iter().filter(|point| !point.counts.is_empty());
         let counts = |Point { series, label, parameters, counts, command, .. }| Point {
@@ -245,21 +252,21 @@ impl Study {
         Self { name, title, question, points, method, version, ..Self::default() }
     }
 
-    /// The points of a series.
+    /// Returns the points of a series.
     pub fn of_series<'a>(&'a self, series: &'a str) -> impl Iterator<Item = &'a Point> {
         self.points.iter().filter(move |point| point.series == series)
     }
 }
 
 impl Machine {
-    /// Whether both are the same machine with the same device; the programs that measured on it may differ.
+    /// Returns true if both are the same machine with the same device. The programs may differ.
     pub fn is_same_place(&self, other: &Self) -> bool {
         Self { version: String::new(), ..self.clone() } == Self { version: String::new(), ..other.clone() }
     }
 }
 
 impl CostReport {
-    /// The study of that name.
+    /// Returns the study with this name.
     pub fn study(&self, name: &str) -> Option<&Study> {
         self.studies.iter().find(|study| study.name == name)
     }

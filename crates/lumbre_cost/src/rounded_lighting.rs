@@ -1,5 +1,6 @@
-//! The lighting equation with every operation rounded to a format of numbers: what the plain arithmetic of a shader would make of a flat sheet. Neither the renderer's
-//! arithmetic, which goes round the hard places, nor the tracer's, which is in f64 throughout.
+//! The lighting equation with every operation rounded to a number format: the result of plain shader
+//! arithmetic for a flat sheet. This is not the arithmetic of the renderer, which avoids the hard cases, nor
+//! that of the tracer, which uses f64 throughout.
 
 use bevy_ecs::prelude::*;
 use glam::DVec3;
@@ -9,45 +10,49 @@ use lumbre_scene::{Camera, GlobalTransform, Mesh, Projection, SceneSettings};
 
 use crate::picture::Picture;
 
-/// A format of numbers, as what it makes of a result that is exact.
+/// A number format, defined by how it rounds exact results.
 ///
-/// Sums, products, quotients and roots of numbers of at most 24 bits that are taken in f64 and then rounded are what the format itself would give: 53 bits are enough for
-/// rounding twice to be rounding once (Figueroa, "When is double rounding innocuous?", 1995).
+/// Sums, products, quotients and roots of numbers of at most 24 bits, computed in f64 and then rounded, are
+/// exactly what the format itself would give: with 53 bits, rounding twice equals rounding once (Figueroa,
+/// "When is double rounding innocuous?", 1995).
 #[derive(Clone, Copy, Debug)]
 pub struct Format {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
     round: fn(f64) -> f64,
 }
 
-/// Formats from the shortest to the longest.
+/// The formats from the shortest to the longest.
 pub const FORMATS: [Format; 2] = [
     Format { name: "f16 equations", round: |value| f64::from(f16::from_f64(value)) },
     Format { name: "f32 equations", round: |value| f64::from(value as f32) },
 ];
 
-/// A picture, and the share of its pixels for which the format has no number: they are black.
+/// A picture, and the fraction of its pixels for which the format has no finite number. These pixels are
+/// black.
 pub struct Rounded {
-    /// The light of each pixel.
+    /// The radiance of each pixel.
     pub picture: Picture,
-    /// From 0 to 1.
+    /// The fraction of pixels without a finite number.
     pub lost: f64,
 }
 
-/// A sheet in its own plane y = 0 under one light: what the equation reads, relative to the eye, as a frame has it.
+/// The inputs of the lighting equation for a sheet in its own plane y = 0 under one light, relative to the
+/// eye as in a frame.
 struct Equation {
     normal: DVec3,
-    /// Place of a lamp, or direction towards a distant light.
+    /// Position of a lamp, or direction towards a distant light.
     light: DVec3,
     is_distant: bool,
     color: DVec3,
-    /// Coefficients by ambient, diffuse and specular light.
+    /// Reflection coefficients for ambient, diffuse and specular light.
     surface: [DVec3; 3],
     ambient: DVec3,
     shininess: f64,
 }
 
-/// The light that a sheet reflects at the middle of every pixel; nothing for a World that is no sheet under one light with a camera.
+/// Returns the light that a sheet reflects at the centre of every pixel; `None` if the World is not a sheet
+/// under one light with a camera.
 pub fn rounded_lighting(world: &mut World, size: (u32, u32), format: Format) -> Option<Rounded> {
     let mut cameras = world.query::<(&Camera, &GlobalTransform)>();
     let (camera, seen_from) = cameras.iter(world).next()?;
@@ -80,7 +85,8 @@ pub fn rounded_lighting(world: &mut World, size: (u32, u32), format: Format) -> 
             let x = (2.0 * (f64::from(column) + 0.5) / width - 1.0) * half * width / height;
             let y = (1.0 - 2.0 * (f64::from(row) + 0.5) / height) * half;
             let towards = axes.x_axis * x + axes.y_axis * y - axes.z_axis;
-            // Where the ray meets the sheet is the rasterizer's affair, and exact here.
+            // The intersection of the ray with the sheet is computed exactly, since it is the rasterizer's
+            // task.
             let point = towards * (middle.dot(normal) / towards.dot(normal));
             let pixel = Arithmetic(format.round).shade(&equation, point);
             lost += u32::from(!pixel.is_finite());
@@ -91,7 +97,7 @@ pub fn rounded_lighting(world: &mut World, size: (u32, u32), format: Format) -> 
     Some(Rounded { picture: Picture { width: size.0 as usize, radiance }, lost })
 }
 
-/// Arithmetic of a format.
+/// Arithmetic in a number format.
 struct Arithmetic(fn(f64) -> f64);
 
 impl Arithmetic {
@@ -109,7 +115,8 @@ impl Arithmetic {
         self.each(vector / length)
     }
 
-    /// Ambient, diffuse and Phong's specular light, as the documents write them: E = k_a A + f (k_d L n·l + k_s L (r·v)ⁿ).
+    /// Returns ambient, diffuse and Phong's specular light by the documents' equation: E = k_a A + f (k_d L
+    /// n·l + k_s L (r·v)ⁿ).
     fn shade(&self, equation: &Equation, point: DVec3) -> DVec3 {
         let round = self.0;
         let (point, normal) = (self.each(point), self.each(equation.normal));
@@ -162,7 +169,7 @@ mod tests {
         (relative_error(&exact.radiance, &rounded.picture.radiance), rounded.lost)
     }
 
-    /// Without rounding it is what the tracer says, which is other code.
+    /// Without rounding, the result is that of the tracer, which is independent code.
     #[test]
     fn unrounded_it_is_the_traced_sheet() {
         let unrounded = Format { name: "f64 equations", round: |value| value };
@@ -174,7 +181,7 @@ mod tests {
             Sheet { scale: 5e4, ..Sheet::PLAIN },
         ] {
             let (error, lost) = error(asked, unrounded);
-            // Colours are f32 in the scene, meshes too.
+            // Colours and meshes of the scene are f32.
             assert!(error < 1e-6 && lost == 0.0, "{asked:?}: {error}, {lost}");
         }
     }

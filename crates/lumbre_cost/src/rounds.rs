@@ -1,26 +1,28 @@
-//! Work that is timed in rounds, each of which does all of it once: what else the machine does meets every piece alike. Not the work.
+//! Times pieces of work in rounds. Each round does every piece once, so that other load on the machine
+//! affects all of them alike.
 
 use std::time::{Duration, Instant};
 
 use crate::CostError;
 
-/// How often work is done.
+/// The number of rounds.
 #[derive(Clone, Copy, Debug)]
 pub struct Rounds {
-    /// Rounds that do not count: pipelines are made, buffers grow, caches fill.
+    /// Untimed rounds at the beginning, in which pipelines are created, buffers grow and caches fill.
     pub warm_up: usize,
-    /// Fewest rounds, however long they take: with less there is no spread to speak of.
-    pub fewest: usize,
-    /// Most rounds: what varies after these varies with the hour.
-    pub most: usize,
-    /// After which no further round is begun.
+    /// Smallest number of rounds, however long they take. With fewer there is no meaningful spread.
+    pub min: usize,
+    /// Largest number of rounds. More rounds would only measure how the load of the machine changes.
+    pub max: usize,
+    /// Time after which no further round begins.
     pub time: Duration,
 }
 
-/// A piece of work, which answers with its milliseconds.
+/// A piece of work, which returns its duration in milliseconds.
 pub type Work<'a> = Box<dyn FnMut() -> Result<f64, CostError> + 'a>;
 
-/// Does some of the work as often as [`Rounds::warm_up`] says, untimed. `go_on` is asked before each piece.
+/// Does pieces of work without timing, as often as [`Rounds::warm_up`] says. `go_on` is called before each
+/// piece.
 ///
 /// # Errors
 /// The first error of the work or of `go_on`.
@@ -38,17 +40,18 @@ pub fn warm_up<'a, 'w: 'a>(
     Ok(())
 }
 
-/// Work that is too long for rounds by time, with what it made.
+/// The times and the result of repeated work.
 #[derive(Clone, Debug)]
 pub struct Repeated<T> {
     /// Milliseconds of each round.
     pub times: Vec<f64>,
-    /// What the last round made.
+    /// The result of the last round.
     pub made: T,
 }
 
-/// Does so many pieces of work in so many rounds (one at least), in turn, every other round backwards. `work` is told which piece it is and which shares of all are done before and after it, and
-/// answers with its milliseconds and what it made.
+/// Does pieces of work in turn, in `rounds` rounds (at least one), with the order reversed in every
+/// other round. `work` gets the index of a piece and the fractions of all the work that are done before and
+/// after it; it returns its duration in milliseconds and its result.
 ///
 /// # Errors
 /// The first error of the work.
@@ -72,8 +75,9 @@ pub fn repeated<T>(
     Ok(done.into_iter().flatten().collect())
 }
 
-/// Does the work in rounds, after [`warm_up`]. Every other round goes backwards, so that none always follows the same one. `go_on` is asked between any two
-/// pieces, with the share of the rounds that is done, 0 to 1.
+/// Does work in rounds, after [`warm_up`]. The order is reversed in every other round, so that no piece
+/// always follows the same one. `go_on` is called between any two pieces, with the fraction of rounds that
+/// are done.
 ///
 /// # Errors
 /// The first error of the work or of `go_on`.
@@ -84,13 +88,13 @@ pub fn in_rounds(
 ) -> Result<Vec<Vec<f64>>, CostError> {
     let begun = Instant::now();
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); work.len()];
-    for round in 0..rounds.most.max(rounds.fewest) {
-        if round >= rounds.fewest && begun.elapsed() >= rounds.time {
+    for round in 0..rounds.max.max(rounds.min) {
+        if round >= rounds.min && begun.elapsed() >= rounds.time {
             break;
         }
         for step in 0..work.len() {
             let by_time = begun.elapsed().as_secs_f64() / rounds.time.as_secs_f64().max(1e-9);
-            let by_number = (round * work.len() + step) as f64 / (rounds.fewest * work.len()).max(1) as f64;
+            let by_number = (round * work.len() + step) as f64 / (rounds.min * work.len()).max(1) as f64;
             go_on(by_time.min(by_number).min(1.0))?;
             let piece = if round % 2 == 0 { step } else { work.len() - 1 - step };
             times[piece].push(work[piece]()?);
@@ -99,7 +103,7 @@ pub fn in_rounds(
     Ok(times)
 }
 
-/// Milliseconds since a moment.
+/// Returns the milliseconds since `begun`.
 pub fn milliseconds_since(begun: Instant) -> f64 {
     begun.elapsed().as_secs_f64() * 1e3
 }
@@ -120,7 +124,7 @@ mod tests {
                 Ok(name as f64)
             })
         };
-        let rounds = Rounds { warm_up: 1, fewest: 2, most: 2, time: Duration::ZERO };
+        let rounds = Rounds { warm_up: 1, min: 2, max: 2, time: Duration::ZERO };
         let mut work = [piece(0), piece(1), piece(2)];
         warm_up(&mut work, rounds, &|| Ok(())).expect("nothing fails");
         let times = in_rounds(&mut work, rounds, &|_| Ok(()));
@@ -147,7 +151,7 @@ mod tests {
 
     #[test]
     fn whoever_wants_it_to_end_is_heard() {
-        let rounds = Rounds { warm_up: 0, fewest: 5, most: 5, time: Duration::from_secs(1) };
+        let rounds = Rounds { warm_up: 0, min: 5, max: 5, time: Duration::from_secs(1) };
         let mut done = 0;
         let work: Work<'_> = Box::new(|| {
             done += 1;

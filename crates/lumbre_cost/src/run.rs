@@ -1,4 +1,5 @@
-//! A report from end to end: which studies are still to be done, each of them, and what is kept after each.
+//! Makes a whole report: determines which studies have to be run, runs them, and writes the folder after
+//! each.
 
 use std::cell::RefCell;
 use std::ops::ControlFlow;
@@ -14,43 +15,45 @@ use crate::machine::machine;
 use crate::studies::{STUDIES, StudyKind};
 use crate::{Conditions, CostError, CostReport, Machine, Settings, Study};
 
-/// What a report is asked for.
+/// The options of a report.
 #[derive(Clone, Debug)]
 pub struct CostOptions {
-    /// The scenes; without any the studies make their own.
+    /// The scene files; if there are none, the studies create their own scenes.
     pub files: Vec<PathBuf>,
-    /// The studies, in their order.
+    /// The studies, in the order of the page.
     pub studies: Vec<StudyKind>,
-    /// Fewer points and rounds.
+    /// Whether to measure fewer points and rounds.
     pub quick: bool,
-    /// Counts alone, which are the same on every machine: nothing is timed, and no picture kept.
+    /// Whether to record only counts, which are the same on every machine: nothing is timed, and no picture
+    /// is kept.
     pub counts_only: bool,
     /// Width and height of the pictures in pixels.
     pub size: (u32, u32),
-    /// Of everything that draws random numbers.
+    /// Seed of all random numbers.
     pub seed: u32,
-    /// Keeps what the folder holds already of this machine and these settings: of the studies that are asked for those that this program has measured by the same method, and all others.
+    /// Whether to keep the studies that the folder contains from the same machine with the same settings.
+    /// Requested studies are kept only if this version of the program measured them by the same method.
     pub resume: bool,
 }
 
-/// How far a report is.
+/// The progress of a report.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CostProgress {
-    /// The study that is measured.
+    /// The name of the study that is being measured.
     pub study: &'static str,
-    /// Which of the studies that is, from 0.
+    /// Its index among the studies.
     pub number: usize,
-    /// How many there are.
+    /// Number of studies.
     pub of: usize,
-    /// How much of it is done, 0 to 1; nothing if there is nothing new to say.
+    /// Fraction of the study that is done; `None` if it has not changed.
     pub fraction: Option<f64>,
 }
 
-/// Measures what is asked for into a folder. After each study everything is written, so that an end at any time keeps what is finished. `told` is
-/// called often, from several threads.
+/// Measures a report into a folder. The folder is written after each study, so that an interruption keeps all
+/// finished studies. `told` is called often, from several threads.
 ///
 /// # Errors
-/// [`CostError`], the first; [`CostError::Interrupted`] if `told` answers with `Break`.
+/// The first [`CostError`]; [`CostError::Interrupted`] if `told` returns `Break`.
 pub fn measure(
     gpu: &Gpu,
     options: &CostOptions,
@@ -58,13 +61,14 @@ pub fn measure(
     told: &(dyn Fn(CostProgress) -> ControlFlow<()> + Sync),
 ) -> Result<CostReport, CostError> {
     let folder = Folder::open(path)?;
-    // Counts are nobody's: what they were counted on would be all that differs between two such reports.
+    // Reports of counts do not name a machine, so that those of different machines are equal.
     let machine = if options.counts_only { Machine::default() } else { machine(gpu) };
     let settings = settings(options);
     let former = if options.resume { folder.report()? } else { None };
     let former = former.filter(|kept| kept.machine.is_same_place(&machine) && kept.settings == settings);
     let mut studies = former.map_or_else(Vec::new, |former| former.studies);
-    // What is to be measured anew does not stand beside what is new meanwhile.
+    // Studies that are to be measured again are removed first, so that old results do not stand beside new
+    // ones.
     let is_current = |study: &Study, kind: &StudyKind| {
         let is_whole = || study.points.iter().all(|point| has_pictures(folder.path(), point));
         study.method == kind.method && study.version == machine.version && is_whole()
@@ -82,7 +86,7 @@ pub fn measure(
             continue;
         }
         let listener = |fraction| told(CostProgress { study: kind.name, number, of, fraction });
-        // One for each study: what it uploads does not depend on the studies before it.
+        // Each study has a renderer of its own, so that its uploads do not depend on earlier studies.
         let pictures = RefCell::new(Renderer::new(gpu));
         let conditions = Conditions {
             gpu,
@@ -117,7 +121,7 @@ pub fn measure(
     Ok(report)
 }
 
-/// Puts a study in the place that it has on the page.
+/// Inserts a study at its position in the order of the page.
 fn insert(studies: &mut Vec<Study>, study: Study) {
     let place = |name: &str| STUDIES.iter().position(|kind| kind.name == name);
     let at = studies.iter().position(|other| place(&other.name) > place(&study.name));

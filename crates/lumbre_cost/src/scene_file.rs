@@ -1,5 +1,5 @@
-//! Scenes as files, those that were given and those that studies make: each is measured as it was read, so that whoever runs a point's command
-//! gets the same.
+//! Scenes as files, both those that were passed and those that studies create. Each is measured as read from
+//! its file, so that a point's command reproduces the result.
 
 use std::path::PathBuf;
 
@@ -15,18 +15,18 @@ use crate::{Conditions, CostError};
 /// A scene in a file.
 #[derive(Clone, Debug)]
 pub struct SceneFile {
-    /// What it is called in the report.
+    /// Its name in the report.
     pub name: String,
     path: PathBuf,
-    /// The path as commands name it that are run in the report's folder.
+    /// Its path in commands, which are run in the report's folder.
     in_commands: String,
 }
 
 impl SceneFile {
-    /// The files that were given.
+    /// Returns the files that were passed.
     ///
     /// # Errors
-    /// [`CostError::File`] where there is none.
+    /// [`CostError::File`] if a file does not exist.
     pub fn given(conditions: &Conditions<'_>) -> Result<Vec<Self>, CostError> {
         let scene = |path: &PathBuf| {
             let whole = path.canonicalize();
@@ -38,7 +38,7 @@ impl SceneFile {
         conditions.files.iter().map(scene).collect()
     }
 
-    /// Writes a scene of a study's own below the report's folder.
+    /// Writes a scene that a study has created below the report's folder.
     ///
     /// # Errors
     /// [`CostError::File`], [`CostError::Save`].
@@ -46,14 +46,14 @@ impl SceneFile {
         let folder = conditions.folder.join("scenes");
         std::fs::create_dir_all(&folder)
             .map_err(|source| CostError::File { path: folder.clone(), source })?;
-        // Not `with_extension`: a name may have a dot in it.
+        // `with_extension` would cut off the part of a name that follows a dot.
         let path = folder.join(format!("{name}.glb"));
         save(&mut world, &path)?;
         Ok(Self { name: name.replace('-', " "), path, in_commands: format!("scenes/{name}.glb") })
     }
 
-    /// Reads it. A scene without a camera gets one that sees everything, and one that would be black a light at the camera, as
-    /// `lumbre render` has it.
+    /// Reads the scene. As in `lumbre render`, a scene without a camera gets one that sees everything, and a
+    /// scene without light gets a light at the camera.
     ///
     /// # Errors
     /// [`CostError::Load`].
@@ -79,12 +79,13 @@ impl SceneFile {
         Ok(world)
     }
 
-    /// What a series is called of this scene: with the scene's name where there are several.
+    /// Returns the name of a series for this scene, which includes the scene's name if there are several
+    /// scenes.
     pub fn series(&self, conditions: &Conditions<'_>, name: &str) -> String {
         if conditions.files.len() > 1 { format!("{name}, {}", self.name) } else { name.to_owned() }
     }
 
-    /// Its path in commands that are run in the report's folder.
+    /// Returns its path in commands, which are run in the report's folder.
     pub fn in_commands(&self) -> &str {
         &self.in_commands
     }

@@ -1,32 +1,38 @@
-//! Times of the same work, repeated: their median, and a range that says how far to trust it. Not the repeating.
+//! Repeated times of the same work: their median, and a range that shows how reliable it is.
 
 use serde::{Deserialize, Serialize};
 
-/// Milliseconds of some work over several rounds.
+/// Median and range of the times of some work, in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// The lower quartile; the shortest time where there are fewer than [`ROUNDS_WITH_QUARTILES`](Self::ROUNDS_WITH_QUARTILES) rounds.
+    /// The lower quartile; the shortest time if there are fewer than
+    /// [`MIN_ROUNDS_FOR_QUARTILES`](Self::MIN_ROUNDS_FOR_QUARTILES) rounds.
     pub lower: f64,
-    /// Half of the rounds took at most this long.
+    /// The median.
     pub median: f64,
-    /// The upper quartile; the longest time where there are few rounds.
+    /// The upper quartile; the longest time if there are fewer than
+    /// [`MIN_ROUNDS_FOR_QUARTILES`](Self::MIN_ROUNDS_FOR_QUARTILES) rounds.
     pub upper: f64,
-    /// Rounds that were measured.
+    /// Number of rounds.
     pub rounds: usize,
 }
 
-/// Two-sided probability that the interval of [`Spread::of_median`] misses the true median.
+/// Largest probability that the interval of [`Spread::of_median`] misses the true median, on both sides
+/// together.
 const MISSES: f64 = 0.05;
 
 impl Spread {
-    /// With fewer rounds than this, quartiles would be interpolated between so few times that they say nothing: the extremes take their place.
-    pub const ROUNDS_WITH_QUARTILES: usize = 5;
-    /// With fewer rounds than this, two pieces of work that take equally long would often have ranges that lie apart (one time in three, with two rounds each).
-    pub const FEWEST_ROUNDS_THAT_TELL: usize = 3;
-    /// With fewer pairs than this, all ratios of two equal times lie on one side of 1 more than one time in sixteen.
-    pub const FEWEST_PAIRS_THAT_TELL: usize = 5;
+    /// Smallest number of rounds for which quartiles are computed. With fewer rounds they would be
+    /// interpolated between too few times to be meaningful, and the extremes are used instead.
+    pub const MIN_ROUNDS_FOR_QUARTILES: usize = 5;
+    /// Smallest number of rounds from which two times are told apart. With two rounds each, work of equal
+    /// duration would have disjoint ranges one time in three.
+    pub const MIN_ROUNDS_TO_DISTINGUISH: usize = 3;
+    /// Smallest number of pairs from which a ratio is told apart from 1. With fewer, all ratios of equal
+    /// times lie on the same side of 1 more than one time in sixteen.
+    pub const MIN_PAIRS_TO_DISTINGUISH: usize = 5;
 
-    /// Of at least one time; nothing of none.
+    /// Returns the spread of some times; `None` if there are none.
     pub fn of(times: &[f64]) -> Option<Self> {
         let sorted = sorted(times);
         let last = sorted.len().checked_sub(1)?;
@@ -35,15 +41,17 @@ impl Spread {
             let (low, part) = (quarter * last / 4, (quarter * last % 4) as f64 / 4.0);
             sorted[low] + part * (sorted[(low + 1).min(last)] - sorted[low])
         };
-        let (lower, upper) = match sorted.len() < Self::ROUNDS_WITH_QUARTILES {
+        let (lower, upper) = match sorted.len() < Self::MIN_ROUNDS_FOR_QUARTILES {
             true => (sorted[0], sorted[last]),
             false => (at(1), at(3)),
         };
         Some(Self { lower, median: at(2), upper, rounds: sorted.len() })
     }
 
-    /// The median with an interval that holds the true median with at least 95 % confidence, whatever the distribution: between two order statistics whose ranks follow from the binomial
-    /// distribution. With fewer than six values the extremes are the most that can be said (94 % for five). Nothing of no values.
+    /// Returns the median with an interval that contains the true median with a confidence of at least 95 %,
+    /// whatever the distribution. Its ends are two order statistics whose ranks follow from the binomial
+    /// distribution. With fewer than six values the interval ends at the extremes, and the confidence is
+    /// lower (94 % for five). `None` if there are no values.
     pub fn of_median(values: &[f64]) -> Option<Self> {
         let sorted = sorted(values);
         let count = sorted.len();
@@ -52,12 +60,13 @@ impl Spread {
         Some(Self { lower: sorted[rank], median, upper: sorted[count - 1 - rank], rounds: count })
     }
 
-    /// Whether it lies below the other, ranges and all, and both have rounds enough for that to mean something.
+    /// Returns true if its whole range lies below that of the other, and both have enough rounds for this to
+    /// mean something.
     pub fn is_below(&self, other: &Self) -> bool {
-        self.rounds.min(other.rounds) >= Self::FEWEST_ROUNDS_THAT_TELL && self.upper < other.lower
+        self.rounds.min(other.rounds) >= Self::MIN_ROUNDS_TO_DISTINGUISH && self.upper < other.lower
     }
 
-    /// Half of its range, in milliseconds.
+    /// Returns half the width of its range, in milliseconds.
     pub fn half_width(&self) -> f64 {
         0.5 * (self.upper - self.lower)
     }
@@ -69,9 +78,11 @@ fn sorted(values: &[f64]) -> Vec<f64> {
     sorted
 }
 
-/// How many values may be left out at each end of so many for the rest to hold the median with the confidence that is asked for.
+/// Returns how many of `count` values can be left out at each end so that the interval of the others still
+/// contains the median with the required confidence.
 fn ranks_outside(count: usize) -> usize {
-    // The k-th smallest lies above the median if fewer than k values lie below it: each does with probability 1/2.
+    // The k-th smallest value lies above the median if fewer than k values lie below it. Each value does so
+    // with probability 1/2.
     let mut term = 0.5f64.powi(i32::try_from(count).unwrap_or(i32::MAX));
     let (mut outside, mut sum) = (0, term);
     while outside + 1 < count.div_ceil(2) {
@@ -82,7 +93,7 @@ fn ranks_outside(count: usize) -> usize {
         sum += term;
         outside += 1;
     }
-    // With very few values even the extremes miss it more often, and nothing can be left out.
+    // With very few values even the extremes miss the median too often, and nothing can be left out.
     if 2.0 * sum > MISSES { 0 } else { outside }
 }
 
@@ -111,7 +122,8 @@ mod tests {
         assert!(!spread(&[1.0, 1.1]).is_below(&slow), "two prove little");
     }
 
-    /// Ranks from tables of the binomial distribution (as in Conover, "Practical Nonparametric Statistics", 1999, table A3).
+    /// Ranks from tables of the binomial distribution (as in Conover, "Practical Nonparametric Statistics",
+    /// 1999, table A3).
     #[test]
     fn intervals_of_the_median_have_the_ranks_of_the_tables() {
         for (count, outside) in

@@ -1,13 +1,13 @@
-//! A report as a table: a row a point, the same columns for all.
+//! Writes a report as a table, with one row per point and the same columns for all studies.
 
 use std::collections::BTreeSet;
 
 use crate::{CostReport, Point};
 
-/// Comma-separated values with a line of names; empty where a point has no such number.
+/// Returns comma-separated values with a header line. Cells are empty where a point has no such value.
 ///
 /// # Errors
-/// What the writer says.
+/// The error of the CSV writer.
 pub fn write_table(report: &CostReport) -> Result<Vec<u8>, csv::Error> {
     let points = || report.studies.iter().flat_map(|study| study.points.iter());
     let names = |of: fn(&Point) -> Vec<&String>| -> BTreeSet<&String> { points().flat_map(of).collect() };

@@ -1,4 +1,4 @@
-//! Reference pictures by rays, in f64. Not what is compared with them.
+//! Traces reference pictures in f64.
 
 use bevy_ecs::world::World;
 use lumbre_trace::{Integrator, Picture as Traced, TraceOptions, TraceReport, trace};
@@ -7,7 +7,8 @@ use crate::picture::Picture;
 use crate::scene_file::SceneFile;
 use crate::{Conditions, CostError};
 
-/// The lighting equation at the middle of every pixel: neither shadows nor mirrors, lightmaps as a frame has them.
+/// Traces the lighting equation at the centre of every pixel, without shadows and mirrors, and with lightmaps
+/// as in a frame.
 ///
 /// # Errors
 /// [`CostError::Trace`], [`CostError::Load`], [`CostError::Interrupted`].
@@ -16,12 +17,12 @@ pub fn lighting_of(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Pic
     Ok(traced(conditions, scene, &options)?.0)
 }
 
-/// The ray tree's options for the pictures of a report.
+/// Returns the options of the ray tree for the pictures of a report.
 pub fn ray_tree(conditions: &Conditions<'_>) -> TraceOptions {
     TraceOptions { size: conditions.size, integrator: Integrator::Whitted, ..TraceOptions::default() }
 }
 
-/// A traced picture, with what is said of it.
+/// Traces a picture of a scene, and returns it with the tracer's report.
 ///
 /// # Errors
 /// [`CostError::Trace`], [`CostError::Load`], [`CostError::Interrupted`].
@@ -33,7 +34,7 @@ pub fn traced(
     traced_world(conditions, &mut scene.open(conditions.aspect())?, options)
 }
 
-/// The same of a World.
+/// Traces a picture of a World, and returns it with the tracer's report.
 ///
 /// # Errors
 /// [`CostError::Trace`], [`CostError::Interrupted`].
@@ -42,7 +43,7 @@ pub fn traced_world(
     world: &mut World,
     options: &TraceOptions,
 ) -> Result<(Picture, TraceReport), CostError> {
-    // What the study tells of itself stays as it is; the listener is only asked whether to go on.
+    // The progress of the study is not reported from here; the listener only decides whether to go on.
     let (picture, report) = trace(world, options, &|_| (conditions.listener)(None))?;
     if report.ended == lumbre_trace::Ended::Interrupted {
         return Err(CostError::Interrupted);

@@ -1,4 +1,4 @@
-//! The page and the JSON of a report: well-formed, complete, with nothing from elsewhere.
+//! The page and the JSON of a report: they are well-formed, complete and self-contained.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -6,7 +6,8 @@ use lumbre_cost::{
     CostReport, ErrorOf, ErrorOver, Plot, Point, PointPicture, Quantity, Settings, Spread, Study, page,
 };
 
-/// Studies with everything that a page may have to show: pictures, zeros, names that want escaping, a plot without a point.
+/// Studies with everything that a page may have to show: pictures, zeros, names that need escaping, a plot
+/// without points.
 fn report() -> CostReport {
     let point = |series: &str, label: &str, ms: f64, error: f64| Point {
         series: series.into(),
@@ -70,7 +71,7 @@ fn drawn() -> String {
     page(&report(), &|name| Some(format!("png of {name}").into_bytes())).unwrap()
 }
 
-/// Checks that every element that is opened is closed in its order, and that what stands in text and attributes is escaped.
+/// Checks that elements are closed in the right order, and that text and attributes are escaped.
 fn check_nesting(page: &str) {
     const VOID: [&str; 3] = ["meta", "img", "input"];
     // Scripts and styles have rules of their own.

@@ -1,4 +1,4 @@
-//! Fronts, stretches and sentences on points whose answer is known, and two reports with a planted difference.
+//! Fronts, ranges and sentences for points whose answer is known, and two reports with a planted difference.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -7,7 +7,7 @@ use lumbre_cost::{
     stretches,
 };
 
-/// A point of a series: an error as a share, and milliseconds with quartiles so far to either side.
+/// A point of a series: an error as a fraction, and milliseconds with quartiles this far to either side.
 fn point(series: &str, label: &str, error: f64, ms: f64, beside: f64) -> Point {
     Point {
         series: series.into(),
@@ -19,7 +19,8 @@ fn point(series: &str, label: &str, error: f64, ms: f64, beside: f64) -> Point {
     }
 }
 
-/// Two curves that cross between an error of 4 % and one of 2 %: "quick" costs 1 + 1/e, "fine" 20 + 0.1/e, in per cent.
+/// Two curves that cross between errors of 4 % and 2 %: "quick" costs 1 + 1/e, "fine" 20 + 0.1/e, with e in
+/// per cent.
 fn crossing(beside: f64) -> Vec<Point> {
     let errors = [16.0, 8.0, 4.0, 2.0, 1.0];
     let mut points = Vec::new();
@@ -36,7 +37,7 @@ fn a_crossing_at_a_known_place_is_found() {
     let points = crossing(0.1);
     let found: Vec<&Point> = points.iter().collect();
     let found = stretches(&found);
-    // 4 %: 21 against 30. 2 %: 41 against 32. One percent: 81 against 36.
+    // At 4 %: 21 against 30. At 2 %: 41 against 32. At 1 %: 81 against 36.
     let names: Vec<(f64, f64, Vec<&str>)> = found
         .iter()
         .map(|s| (s.from, s.to, s.cheapest.iter().map(|point| point.series.as_str()).collect()))
@@ -64,7 +65,7 @@ fn curves_that_do_not_cross_have_one_winner() {
     assert_eq!((found[0].from, found[0].to, found[0].cheapest.len()), (0.02, f64::INFINITY, 1));
     let said = cheapest_by_error(&all, "").unwrap();
     assert!(said.starts_with("At every error down to 2.00 % the cheapest is quick ("), "{said}");
-    assert!(said.ends_with("Never so: slow."), "{said}");
+    assert!(said.ends_with("Never the cheapest: slow."), "{said}");
 }
 
 #[test]
@@ -77,7 +78,8 @@ fn times_within_each_others_quartiles_decide_nothing() {
     assert!(!said.contains("cheapest is"), "{said}");
 }
 
-/// "fine" is nearer by the numbers and slower; but the reference does not tell the two errors apart.
+/// "fine" has the smaller error by the numbers and is slower, but the reference does not distinguish the two
+/// errors.
 #[test]
 fn errors_within_what_the_reference_leaves_open_decide_nothing() {
     let with = |series: &str, error: f64, ms: f64, uncertainty: f64| Point {
@@ -96,7 +98,7 @@ fn errors_within_what_the_reference_leaves_open_decide_nothing() {
     let (cheapest, by_error, said) = told(0.005);
     assert_eq!((cheapest, by_error), (2, true));
     assert!(said.contains("the times and errors do not decide between fine and quick"), "{said}");
-    // What is surely slower is ruled out all the same.
+    // What is certainly slower is ruled out nevertheless.
     let points = [with("slow", 0.022, 20.0, 0.005), with("fine", 0.020, 9.0, 0.005)];
     assert_eq!(stretches(&points.iter().collect::<Vec<_>>())[0].cheapest.len(), 1);
 }
@@ -152,7 +154,7 @@ fn a_planted_slow_down_is_found_and_noise_is_not() {
         changes[0].to_string(),
         "bake, final, a: 15.0 ± 1.00 ms instead of 10.0 ± 1.00 ms (1.50 times)"
     );
-    // The other way round it is a change, and no worse one.
+    // In the other direction it is a change, but not for the worse.
     let back = compare_reports(&slower, &before, 1.1);
     assert!(back.len() == 1 && !back[0].is_slower() && !back[0].is_worse(), "{back:?}");
     assert!(compare_reports(&before, &slower, 2.0).is_empty());
@@ -170,7 +172,7 @@ fn a_planted_error_and_a_planted_count_are_found() {
     assert!(changes.iter().any(|change| matches!(change.what, What::Error { .. })));
     assert!(compare_reports(&before, &worse, 1.3).is_empty());
     assert!(compare_reports(&worse, &before, 1.1).iter().all(|change| !change.is_worse()));
-    // What the references leave open is no change.
+    // Differences within the references' uncertainty are no change.
     let open = ErrorOf { relative_rmse: 0.012, uncertainty: 0.01, ..ErrorOf::default() };
     worse.studies[0].points[0].error = Some(open);
     let open = compare_reports(&before, &worse, 1.1);
@@ -212,10 +214,10 @@ fn what_shrinks_comes_or_goes_is_reported_and_fails_only_where_something_is_lost
     });
     assert_eq!(quicker, (false, false, named("5.00 ± 0.100 ms instead of 10.0 ± 0.100 ms (0.500 times)")));
     let untimed = changed(&|point| point.milliseconds = None);
-    assert_eq!(untimed, (false, false, named("has no time any more")));
+    assert_eq!(untimed, (false, false, named("no longer has a time")));
     let unjudged = changed(&|point| point.error = None);
-    assert_eq!(unjudged, (true, false, named("has no error any more")));
-    // The other way round, what is lost is gained.
+    assert_eq!(unjudged, (true, false, named("no longer has an error")));
+    // In the other direction, what is lost is gained.
     let mut without = before.clone();
     (without.studies[0].points[0].milliseconds, without.studies[0].points[0].error) = (None, None);
     let gained = compare_reports(&without, &before, 1.1);
@@ -243,5 +245,5 @@ fn a_count_that_comes_from_nothing_or_goes_is_seen() {
     without.studies[0].points[0].counts.clear();
     let gone = compare_reports(&after, &without, 1.1);
     assert!(gone.len() == 1 && gone[0].is_worse(), "{gone:?}");
-    assert_eq!(gone[0].to_string(), "bake, final, a: rays is not counted any more");
+    assert_eq!(gone[0].to_string(), "bake, final, a: rays is no longer counted");
 }

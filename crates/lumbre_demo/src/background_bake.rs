@@ -258,11 +258,19 @@ impl BackgroundBake {
         self.cancel.cancel();
     }
 
-    /// Writes the baked file in a thread of its own. Does nothing before all passes are done.
+    /// Writes the baked file in a thread of its own. Does nothing before all passes are done. If it fails, the
+    /// bake is kept and can be saved again.
     pub fn save(&mut self, path: &Path) {
-        let Some(mut baked) = self.baked.take() else { return };
+        self.save_in(thread::Builder::new().name("save".to_owned()), path);
+    }
+
+    fn save_in(&mut self, thread: thread::Builder, path: &Path) {
+        let Some(baked) = self.baked.take() else { return };
         let (sender, path) = (self.sender.clone(), path.to_owned());
-        let written = thread::Builder::new().name("save".to_owned()).spawn(move || {
+        // The bake is handed over once the thread runs, so that it is not lost if the thread cannot be started.
+        let (hand_over, taken) = channel::<Box<Baked>>();
+        let started = thread.spawn(move || {
+            let Ok(mut baked) = taken.recv() else { return };
             let saved = save_baked(&mut baked.world, &baked.source, &path, &written_as());
             // The receiver may be gone.
             let _ = sender.send(Message::News(match saved {
@@ -271,10 +279,14 @@ impl BackgroundBake {
             }));
             let _ = sender.send(Message::Done(baked));
         });
-        match written {
-            Ok(thread) => (self.work, self.saving) = (Work::Saving, Some(thread)),
+        match started {
+            Ok(thread) => {
+                (self.work, self.saving) = (Work::Saving, Some(thread));
+                // The thread waits for it.
+                let _ = hand_over.send(baked);
+            }
             Err(error) => {
-                self.work = Work::Nothing;
+                (self.work, self.baked) = (Work::Nothing, Some(baked));
                 let _ = self.sender.send(Message::News(BakeNews::Failed(error.into())));
             }
         }
@@ -432,4 +444,42 @@ fn area(world: &mut World) -> f64 {
         areas.filter(|area| area.is_finite()).sum::<f64>()
     };
     meshes.iter(world).map(of_mesh).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bake_outlasts_a_thread_that_cannot_be_started() {
+        let folder = tempfile::tempdir().unwrap();
+        let [input, output] = ["in.gltf", "out.gltf"].map(|name| folder.path().join(name));
+        std::fs::write(&input, r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{}]}"#).unwrap();
+        let mut source = SourceFile::read(&input, &LoadOptions::default()).unwrap();
+        let mut world = World::new();
+        source.load_into(&mut world).unwrap();
+        let (sender, messages) = channel();
+        let mut bake = BackgroundBake {
+            messages,
+            sender,
+            cancel: CancelToken::default(),
+            status: None,
+            work: Work::Nothing,
+            baked: Some(Box::new(Baked { source, world })),
+            saving: None,
+        };
+        // No system has this much memory for a stack.
+        bake.save_in(thread::Builder::new().stack_size(1 << 60), &output);
+        let news = bake.news();
+        assert!(matches!(news.as_slice(), [BakeNews::Failed(BakeError::Thread(_))]), "{news:?}");
+        assert!(bake.can_be_saved() && !bake.is_running());
+        bake.save(&output);
+        while bake.is_running() {
+            for news in bake.news() {
+                assert!(matches!(news, BakeNews::Saved(_)), "{news:?}");
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
+        assert!(output.exists() && bake.can_be_saved());
+    }
 }

@@ -73,4 +73,4 @@ pub use tour::{TOUR_CAMERA, Tour};
 pub use tour_frames::{tour, tour_of};
 pub use view_settings::ViewSettings;
 #[cfg(feature = "window")]
-pub use window::{PlayOptions, Trial, has_display, run, run_opened};
+pub use window::{PlayOptions, Trial, has_display, key_help, run, run_opened};

@@ -61,8 +61,8 @@ pub(crate) struct PassDeclaration {
     pub owner: Option<Label>,
     pub kind: PassKind,
     pub accesses: Vec<AccessDeclaration>,
-    /// What the pass calls for, each with whether it is there.
-    pub calls_for: Vec<(bool, Label)>,
+    /// What the pass requires, each with whether it is there.
+    pub requirements: Vec<(bool, Label)>,
     pub side_effects: Vec<Label>,
     pub fingerprint: Option<u64>,
     pub after: Vec<Label>,
@@ -71,7 +71,7 @@ pub(crate) struct PassDeclaration {
 
 impl PassDeclaration {
     pub fn is_called_for(&self) -> bool {
-        self.calls_for.iter().all(|(there, _)| *there)
+        self.requirements.iter().all(|(there, _)| *there)
     }
 }
 

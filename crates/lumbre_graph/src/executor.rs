@@ -356,7 +356,7 @@ mod tests {
         let mut target = graph.import_texture("target", described);
         let clear = LoadOp::Clear(wgpu::Color::BLACK);
         graph.raster_pass("always").color(&mut target, clear).run(|_| Ok(()));
-        let pass = graph.raster_pass("sometimes").calls_for(there, "light");
+        let pass = graph.raster_pass("sometimes").requires(there, "light");
         pass.color(&mut target, LoadOp::Load).run(|_| Ok(()));
         graph
     }

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! A pass reads through `&handle` and writes through `&mut handle`, which advances the handle to a new version. It
-//! states what it *calls for*; if that is missing, the pass is skipped, and the resources that it would have
+//! states what it *requires*; if that is missing, the pass is skipped, and the resources that it would have
 //! written keep their previous content. Passes whose results nothing reads are culled. Passes whose results are
 //! retained and would come out the same do not run. Passes that draw into the same attachments share one wgpu
 //! render pass, and transient resources share memory. The plan records all of this with the reasons.
@@ -24,7 +24,7 @@
 //! let mut hdr = graph.texture("hdr", TextureDescriptor::new_2d(640, 360, format));
 //! let mut screen = graph.import_texture("screen", TextureDescriptor::new_2d(640, 360, format));
 //! let black = LoadOp::ClearIfFirst(wgpu::Color::BLACK);
-//! graph.raster_pass("lightmap").calls_for(false, "a lightmapped mesh").color(&mut hdr, black).run(|_| Ok(()));
+//! graph.raster_pass("lightmap").requires(false, "a lightmapped mesh").color(&mut hdr, black).run(|_| Ok(()));
 //! graph.raster_pass("forward").color(&mut hdr, black).run(|context| {
 //!     context.pass.draw(0..3, 0..1);
 //!     Ok(())
@@ -62,7 +62,7 @@ pub use declare::kind::{Compute, PassType, Raster, ResourceKind, Transfer};
 pub use declare::pass::PassBuilder;
 pub use error::{CycleStep, GraphError, GraphResult};
 pub use executor::{Executor, Frame};
-pub use explain::{Calling, Explanation, PassExplanation, ResourceExplanation, Use};
+pub use explain::{Explanation, PassExplanation, Requirement, ResourceExplanation, Use};
 pub use handle::{Buffer, BufferHandle, Handle, Texture, TextureHandle};
 pub use history::History;
 pub use plan::{CompileOptions, Memory, Plan, Status};

@@ -32,7 +32,7 @@ pub enum Status {
         /// What needs its results, or its side effect.
         reason: String,
     },
-    /// Something that it calls for is missing. The resources that it would have written keep their previous
+    /// Something that it requires is missing. The resources that it would have written keep their previous
     /// content.
     Skipped {
         /// "the scene has no …"

@@ -188,7 +188,7 @@ fn producers_skipped() {
     let text = fault(
         |graph| {
             let mut mirror = graph.texture("mirror", hdr());
-            graph.raster_pass("draw mirror").calls_for(false, "a mirror").color(&mut mirror, BLACK);
+            graph.raster_pass("draw mirror").requires(false, "a mirror").color(&mut mirror, BLACK);
             graph.compute_pass("blur").samples(&mirror).side_effect("test");
         },
         |error| matches!(error, GraphError::ProducersSkipped { .. }),
@@ -421,7 +421,7 @@ fn faults_do_not_depend_on_what_the_scene_holds() {
     fault(
         |graph| {
             let depth = graph.texture("depth", hdr());
-            graph.compute_pass("fog").calls_for(false, "fog").samples(&depth).side_effect("test");
+            graph.compute_pass("fog").requires(false, "fog").samples(&depth).side_effect("test");
         },
         |error| matches!(error, GraphError::MissingProducer { .. }),
     );

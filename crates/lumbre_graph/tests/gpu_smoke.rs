@@ -387,7 +387,7 @@ fn a_multisampled_chain_resolves_at_its_end() {
         let draw = draw.clone();
         graph
             .raster_pass(name)
-            .calls_for(name != "one", "luck")
+            .requires(name != "one", "luck")
             .color(&mut many, LoadOp::ClearIfFirst(Color { r: 1.0, g: 0.0, b: 0.0, a: 0.0 }))
             .resolve(&mut target)
             .run(move |context| {

@@ -79,7 +79,7 @@ fn declare(random: &RandomGraph) -> (Graph<'static>, Vec<Uses>) {
     for (index, random) in random.passes.iter().enumerate() {
         let mut of_pass =
             Uses { side_effect: random.side_effect, called_for: random.called_for, ..Uses::default() };
-        let mut pass = graph.raster_pass(format!("pass {index}")).calls_for(random.called_for, "luck");
+        let mut pass = graph.raster_pass(format!("pass {index}")).requires(random.called_for, "luck");
         for &read in &random.reads {
             if read != random.write {
                 pass = pass.reads_optional(&handles[read], TextureRead::Sampled);
@@ -269,7 +269,7 @@ fn ten_passes() -> Graph<'static> {
     for name in ["background", "lightmap", "flat", "gouraud", "phong", "transparent"] {
         graph
             .raster_pass(name)
-            .calls_for(true, "a mesh")
+            .requires(true, "a mesh")
             .reads(&lights, BufferRead::Storage)
             .color(&mut color, LoadOp::ClearIfFirst(Color::BLACK))
             .resolve(&mut resolved)

@@ -27,7 +27,7 @@ struct RandomPass {
     write: Write,
 }
 
-/// For each pass its fingerprint, and whether the scene has what it calls for.
+/// For each pass its fingerprint, and whether the scene has what it requires.
 type RandomFrame = Vec<(u64, bool)>;
 
 fn random() -> impl Strategy<Value = (Vec<bool>, Vec<RandomPass>, Vec<RandomFrame>)> {
@@ -88,7 +88,7 @@ impl Machine {
                 Write::Layer(layer, keep) => {
                     let load =
                         if keep { LoadOp::ClearIfFirst(Color::BLACK) } else { LoadOp::Clear(Color::BLACK) };
-                    let mut builder = graph.raster_pass(name).calls_for(there, "luck");
+                    let mut builder = graph.raster_pass(name).requires(there, "luck");
                     if self.fingerprints {
                         builder = builder.fingerprint(fingerprint);
                     }
@@ -98,7 +98,7 @@ impl Machine {
                     builder.color(&mut handles[pass.target], load).part(Part::layer(layer));
                 }
                 Write::All => {
-                    let mut builder = graph.compute_pass(name).calls_for(there, "luck");
+                    let mut builder = graph.compute_pass(name).requires(there, "luck");
                     if self.fingerprints {
                         builder = builder.fingerprint(fingerprint);
                     }

@@ -38,7 +38,7 @@ fn forward_frame(lightmap: bool, forward: bool, transparent: bool) -> Graph<'sta
     ] {
         graph
             .raster_pass(name)
-            .calls_for(there, what)
+            .requires(there, what)
             .color(&mut color, FIRST)
             .resolve(&mut resolved)
             .depth(&mut z, LoadOp::ClearIfFirst(0.0));
@@ -88,7 +88,7 @@ fn culled_says_who_would_have_read() {
     graph.raster_pass("make a").color(&mut a, BLACK);
     graph.raster_pass("make b").samples(&a).color(&mut b, BLACK);
     graph.raster_pass("make c").color(&mut c, BLACK);
-    graph.raster_pass("mirror").calls_for(false, "a mirror").samples(&c).color(&mut d, BLACK);
+    graph.raster_pass("mirror").requires(false, "a mirror").samples(&c).color(&mut d, BLACK);
     graph.compute_pass("idle");
     let plan = graph.compile().expect("valid");
     assert_eq!(running(&plan), [""; 0]);
@@ -141,7 +141,7 @@ fn clear_if_first_goes_by_part() {
 fn optional_reads_do_without() {
     let mut graph = Graph::new("frame");
     let mut mirror = graph.texture("mirror", hdr());
-    graph.raster_pass("draw mirror").calls_for(false, "a mirror").color(&mut mirror, BLACK);
+    graph.raster_pass("draw mirror").requires(false, "a mirror").color(&mut mirror, BLACK);
     graph.compute_pass("shade").reads_optional(&mirror, TextureRead::Sampled).side_effect("test");
     let plan = graph.compile().expect("valid");
     assert_eq!(running(&plan), ["shade"]);
@@ -238,7 +238,7 @@ fn shadows(sun: u64, lamp: u64, there: bool) -> Graph<'static> {
         .part(Part::layer(0));
     graph
         .raster_pass("lamp shadow")
-        .calls_for(there, "a lamp")
+        .requires(there, "a lamp")
         .fingerprint(lamp)
         .depth(&mut shadows, LoadOp::Clear(0.0))
         .part(Part::layer(1));

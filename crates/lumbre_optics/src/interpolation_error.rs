@@ -307,12 +307,12 @@ fn diffuse(light: &LightOverObject, falloff: &Falloff, triangle: &TriangleSpread
     }
 }
 
-/// The specular part: the highlight S = max(0, cos α)ⁿ times a, or, with an energy-keeping lobe, times a n·l (n +
+/// The specular part: the highlight S = max(0, cos α)ⁿ times a, or, with an energy-conserving lobe, times a n·l (n +
 /// 2)/8.
 fn specular(light: &LightOverObject, falloff: &Falloff, triangle: &TriangleSpread, turns: &Turns) -> Part {
     let Highlight { model, lobe, shininess } = light.highlight;
-    let keeps_energy = lobe == Lobe::EnergyKeeping;
-    let peak = if keeps_energy { lobe_peak(shininess) } else { 1.0 };
+    let conserves_energy = lobe == Lobe::EnergyConserving;
+    let peak = if conserves_energy { lobe_peak(shininess) } else { 1.0 };
     let exponent = model_exponent(model, lobe, shininess);
     let lobe = match model {
         ReflectionModel::Phong => Some(PowerLobe::of_reflection(exponent)),
@@ -335,7 +335,7 @@ fn specular(light: &LightOverObject, falloff: &Falloff, triangle: &TriangleSprea
     let (cosine, cosine_to_flat) = (turns.normal + turns.light, turns.normal_to_flat + turns.light_to_flat);
     let step =
         |cosine: f64| if light.terminator { lobe.at_terminator(light.light_to_viewer, cosine) } else { 0.0 };
-    let part = if keeps_energy {
+    let part = if conserves_energy {
         let change = slope * h + a * (lobe.slope * turn + cosine);
         let product =
             lobe.curvature * turn * turn + 2.0 * lobe.slope * turn * cosine + OF_DIRECTIONS * cosine * cosine;

@@ -49,7 +49,7 @@ mod angle;
 mod attenuation;
 mod blinn_phong;
 mod emission;
-mod energy_keeping;
+mod energy_conserving;
 mod error_bound;
 mod evaluate_light;
 mod fog;
@@ -93,7 +93,7 @@ pub use attenuation::{
 };
 pub use blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
 pub use emission::{add_emission, exitance};
-pub use energy_keeping::{distribution_ggx, gltf_reflection, lobe_peak, smith_attenuation};
+pub use energy_conserving::{distribution_ggx, gltf_reflection, lobe_peak, smith_attenuation};
 pub use error_bound::ErrorBound;
 pub use evaluate_light::{LightSample, NoLight, evaluate_light, try_evaluate_light};
 pub use fog::{

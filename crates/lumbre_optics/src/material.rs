@@ -72,18 +72,18 @@ pub enum Lobe {
     /// As in glTF: k_s is the fraction of the light that is reflected along the normal, so that sharp highlights
     /// are bright and wide ones faint. The exponent is that of n·h in every model, and the Torrance-Sparrow model
     /// becomes glTF's own reflectance ([`gltf_reflection`](crate::gltf_reflection)).
-    EnergyKeeping,
+    EnergyConserving,
 }
 
 impl Lobe {
     /// Both variants.
-    pub const ALL: &'static [Self] = &[Self::Bare, Self::EnergyKeeping];
+    pub const ALL: &'static [Self] = &[Self::Bare, Self::EnergyConserving];
 
     /// The name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bare => "bare",
-            Self::EnergyKeeping => "energy-keeping",
+            Self::EnergyConserving => "energy-keeping",
         }
     }
 
@@ -165,7 +165,7 @@ impl Material {
 
     /// Returns the material for a glTF metallic-roughness material: k_d = base (1 - metallic), k_s = mix(0.04,
     /// base, metallic), n = 2/α² - 2 with α = roughness², clamped to [0, 10⁶] (beyond which f32 cannot tell the
-    /// highlight from a point), with the energy-keeping lobe.
+    /// highlight from a point), with the energy-conserving lobe.
     pub fn from_metallic_roughness(base: Vec3, metallic: f32, roughness: f32) -> Self {
         let front = Surface {
             ambient: base,
@@ -174,7 +174,7 @@ impl Material {
             emission: Vec3::ZERO,
             shininess: shininess_from_roughness(roughness),
         };
-        let (fresnel, lobe) = (Fresnel::NormalReflectance, Lobe::EnergyKeeping);
+        let (fresnel, lobe) = (Fresnel::NormalReflectance, Lobe::EnergyConserving);
         Self { front, fresnel, lobe, ..Self::default() }
     }
 }

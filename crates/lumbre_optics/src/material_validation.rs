@@ -10,7 +10,9 @@ use crate::{AlphaMode, Fresnel, LARGEST_INTENSITY, Material, Surface};
 
 /// Largest reflection coefficient and largest vertex colour. The strongest light ([`LARGEST_INTENSITY`]) times a
 /// coefficient and either a vertex colour (ambient and diffuse) or the factor of 10⁴ that a bare highlight reaches
-/// (see `torrance_sparrow`) is at most 10³⁷, and thirty such lamps still add up in f32.
+/// (see `torrance_sparrow`) is at most 10³⁷, and thirty such lamps still add up in f32. Energy-conserving
+/// highlights reach a factor of 1.3·10⁵ (see `gltf_reflection`): there a single lamp may give 1.3·10³⁸, and the
+/// sum of two is the largest that f32 is sure to hold.
 pub const LARGEST_COEFFICIENT: f32 = 1e3;
 
 /// Why a material is rejected.

@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use crate::blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
-use crate::energy_keeping::{gltf_reflection, lobe_peak};
+use crate::energy_conserving::{gltf_reflection, lobe_peak};
 use crate::lambert::lambert;
 use crate::microfacet_reflection::{Distribution, Fresnel, microfacet_reflection};
 use crate::phong::phong;
@@ -129,7 +129,7 @@ pub fn specular_factor(
     }
 }
 
-/// Returns the exponent that a model's own equation takes for `shininess`. With an energy-keeping lobe `shininess`
+/// Returns the exponent that a model's own equation takes for `shininess`. With an energy-conserving lobe `shininess`
 /// is the exponent of n·h, and the models that take Phong's exponent get a quarter of it.
 ///
 /// # Error of the f32 twin
@@ -138,7 +138,7 @@ pub fn specular_factor(
 pub fn model_exponent(model: ReflectionModel, lobe: Lobe, shininess: f64) -> f64 {
     match (lobe, model) {
         (Lobe::Bare, _) | (_, ReflectionModel::Blinn | ReflectionModel::TorranceSparrow) => shininess,
-        (Lobe::EnergyKeeping, _) => 0.25 * shininess,
+        (Lobe::EnergyConserving, _) => 0.25 * shininess,
     }
 }
 
@@ -146,7 +146,7 @@ pub fn model_exponent(model: ReflectionModel, lobe: Lobe, shininess: f64) -> f64
 /// Torrance-Sparrow model uses the material's distribution and Fresnel reflectance.
 ///
 /// In WGSL a material that chooses other than the defaults of these sets the feature `MICROFACETS`, and an
-/// energy-keeping lobe `ENERGY_KEEPING`.
+/// energy-conserving lobe `ENERGY_CONSERVING`.
 ///
 /// # Error of the f32 twin
 ///
@@ -159,7 +159,7 @@ pub fn specular_reflection(
     viewer: DVec3,
 ) -> DVec3 {
     let (shininess, ior) = (surface.shininess, surface.ior);
-    let reflected = if surface.lobe == Lobe::EnergyKeeping {
+    let reflected = if surface.lobe == Lobe::EnergyConserving {
         if model == ReflectionModel::TorranceSparrow {
             gltf_reflection(normal, light, viewer, shininess, surface.specular)
         } else {

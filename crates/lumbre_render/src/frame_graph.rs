@@ -66,7 +66,7 @@ pub(crate) fn declare<'a>(
     graph.set_owner("overlay");
     graph
         .raster_pass("overlay")
-        .calls_for(overlay.is_some(), "overlay")
+        .requires(overlay.is_some(), "overlay")
         .color(&mut board.target, LoadOp::Load)
         .run(move |context| {
             if let Some(overlay) = overlay {

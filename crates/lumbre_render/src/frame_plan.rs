@@ -3,8 +3,8 @@
 
 use crate::extract::{MirrorSurface, RefractorSurface};
 use crate::facts::SceneFacts;
-use crate::rehearsal::Rehearsals;
 use crate::statistics::Uploads;
+use crate::warm_up::WarmUps;
 use crate::{Display, FrameOptions, FrameTarget, Gpu, Viewport};
 
 /// How radiance is converted to the target's values.
@@ -101,7 +101,7 @@ impl FramePlan {
             mirrors: None,
             refractors: Vec::new(),
             uploads: Uploads::default(),
-            rehearsals: None,
+            warm_ups: None,
         }
     }
 }
@@ -138,7 +138,7 @@ pub struct FrameShape {
     /// What has been uploaded for the frame.
     pub(crate) uploads: Uploads,
     /// The warm-up device, if pipelines are to be warmed up.
-    pub(crate) rehearsals: Option<Rehearsals>,
+    pub(crate) warm_ups: Option<WarmUps>,
 }
 
 /// The atlas of shadow maps, whether any of them has to be drawn, and how many pipelines draw them.

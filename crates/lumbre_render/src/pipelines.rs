@@ -7,11 +7,11 @@ use std::sync::{Arc, Mutex};
 
 use lumbre_optics::Shading;
 
-use crate::deferred::Deferred;
 use crate::frame_bindings::FrameBindings;
 use crate::g_buffer;
 use crate::irradiance_volumes;
 use crate::mesh_buffers::Attribute;
+use crate::pending::Pending;
 use crate::shader::{self, Feature, Variant};
 use crate::shadows;
 use crate::target::DEPTH_FORMAT;
@@ -50,7 +50,7 @@ pub(crate) struct Pipelines {
     volume_layout: wgpu::BindGroupLayout,
     g_buffer_layout: wgpu::BindGroupLayout,
     modules: Modules,
-    pipelines: HashMap<PipelineKey, Deferred<Pipeline>>,
+    pipelines: HashMap<PipelineKey, Pending<Pipeline>>,
 }
 
 /// A job that runs on the same thread after a pipeline was created.
@@ -138,7 +138,7 @@ impl Pipelines {
                 Err(RenderError::Shader { message, .. }) => Err(message.into()),
                 Err(other) => Err(other.into()),
             };
-            let pipeline = if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) };
+            let pipeline = if wait { Pending::make(make) } else { Pending::begin(gpu, make) };
             self.pipelines.insert(key, pipeline);
         }
         let Some(pipeline) = self.pipelines.get(&key) else { return Ok(false) };

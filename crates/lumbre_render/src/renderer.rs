@@ -34,7 +34,6 @@ use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::{Attribute, MeshBuffers};
 use crate::mirror_views::{MirrorLook, MirrorView, mirror_views};
 use crate::pipelines::{PipelineKey, Pipelines, attributes, is_flat};
-use crate::rehearsal::Rehearsals;
 use crate::shader::Variant;
 use crate::shading_by_need::{Conditions, ShadingByNeed, SizedView, is_shaded_by_need};
 use crate::shading_need::ShadingNeeds;
@@ -44,6 +43,7 @@ use crate::table_texture::most_bytes_of_words;
 use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
 use crate::view_buffers::{SharedBuffers, ViewBuffers};
+use crate::warm_up::WarmUps;
 use crate::world_watch::WorldWatch;
 use crate::{
     Accounting, CpuStages, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, LitPasses,
@@ -70,7 +70,7 @@ pub struct Renderer {
     textures: Textures,
     sets: TextureSets,
     pipelines: Pipelines,
-    rehearsals: Rehearsals,
+    warm_ups: WarmUps,
     effects: Vec<Box<dyn Effect>>,
     without: Vec<BuiltIn>,
     shares: EffectShares,
@@ -147,7 +147,7 @@ impl Renderer {
             textures: Textures::default(),
             sets: TextureSets::default(),
             pipelines: Pipelines::new(gpu),
-            rehearsals: Rehearsals::default(),
+            warm_ups: WarmUps::default(),
             effects: effects::own(&[]),
             without: Vec::new(),
             shares: EffectShares::default(),
@@ -278,9 +278,9 @@ impl Renderer {
         target.check()?;
         self.shares.begin(&self.effects);
         let asked = AskedFrame::new(world, target, options);
-        let still = self.is_still(world);
+        let unchanged = self.is_unchanged(world);
         clock.lap(|cpu| &mut cpu.changes_ms);
-        let frame = match self.last.take().filter(|last| still && last.is(&asked)) {
+        let frame = match self.last.take().filter(|last| unchanged && last.is(&asked)) {
             Some(last) => {
                 let may_stay =
                     options.keep_unchanged && overlay.is_none() && options.measure == Measure::Nothing;
@@ -303,11 +303,11 @@ impl Renderer {
 
     /// Returns true if nothing that this renderer or one of its effects would notice has changed since the
     /// last frame.
-    fn is_still(&mut self, world: &mut World) -> bool {
+    fn is_unchanged(&mut self, world: &mut World) -> bool {
         // No short-circuit: each call also resets what it compares with next time.
-        let still = self.watch.is_still(world);
+        let unchanged = self.watch.is_unchanged(world);
         let effects = self.effects.iter_mut().zip(&mut self.shares.ms);
-        effects.fold(still, |still, (effect, ms)| timed(ms, || effect.is_still(world)) && still)
+        effects.fold(unchanged, |all, (effect, ms)| timed(ms, || effect.is_unchanged(world)) && all)
     }
 
     /// Returns the report of a frame that is not drawn because the target already holds it.
@@ -563,15 +563,15 @@ impl Renderer {
         let drawn = decided.batches().map(|batch| (batch.pipeline, batch.texture_set.as_deref()));
         let lit = decided.draws.deferred.iter().map(|class| (class.pipeline, None));
         for (key, set) in drawn.chain(lit) {
-            let rehearse = || self.rehearsals.of(&self.gpu, key, set);
-            if !self.pipelines.prepare(&self.gpu, &mut self.sets, key, wait, rehearse)? {
+            let warm_up = || self.warm_ups.of(&self.gpu, key, set);
+            if !self.pipelines.prepare(&self.gpu, &mut self.sets, key, wait, warm_up)? {
                 awaited.insert(key);
             }
         }
         let mut count = awaited.len();
         if !decided.lights.shadows.is_empty() {
-            let rehearse = || self.rehearsals.of_casters(&self.gpu);
-            count += usize::from(!self.shadows.prepare(&self.gpu, wait, rehearse)?);
+            let warm_up = || self.warm_ups.of_casters(&self.gpu);
+            count += usize::from(!self.shadows.prepare(&self.gpu, wait, warm_up)?);
         }
         if !wait {
             count += self.ready_effects(decided, seen)?.iter().filter(|ready| !**ready).count();
@@ -582,7 +582,7 @@ impl Renderer {
     /// Returns for each effect whether it can be drawn without waiting.
     fn ready_effects(&mut self, decided: &Decided, seen: &Seen<'_>) -> Result<Vec<bool>, RenderError> {
         let mut shape = decided.decision.shape(seen);
-        shape.rehearsals = Some(self.rehearsals.clone());
+        shape.warm_ups = Some(self.warm_ups.clone());
         let effects = self.effects.iter_mut().zip(&mut self.shares.ms).zip(&decided.called_for);
         let ready = effects.map(|((effect, ms), called)| {
             let (called, name) = (*called, effect.name());

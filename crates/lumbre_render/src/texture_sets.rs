@@ -58,7 +58,7 @@ fn stand_ins(textures: &MaterialTextures) -> MaterialTextures {
         let side = |side: u32| if side.is_power_of_two() { side.min(4) } else { 3 };
         let (width, height) = (side(reference.image.width), side(reference.image.height));
         let rgba = vec![0; 4 * (width * height) as usize];
-        reference.image = Arc::new(Image { name: "rehearsal".to_owned(), width, height, rgba });
+        reference.image = Arc::new(Image { name: "warm-up".to_owned(), width, height, rgba });
     }
     small
 }

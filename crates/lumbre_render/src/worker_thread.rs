@@ -1,4 +1,4 @@
-//! A worker thread for jobs that no frame waits for. What is created on it is described in `deferred`.
+//! A worker thread for jobs that no frame waits for. What is created on it is described in `pending`.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};

@@ -33,7 +33,7 @@ pub(crate) struct WorldWatch {
 
 impl WorldWatch {
     /// Returns true if nothing has changed since the last call; false if the last call was for another World.
-    pub fn is_still(&mut self, world: &mut World) -> bool {
+    pub fn is_unchanged(&mut self, world: &mut World) -> bool {
         let known = self.state.as_ref().is_some_and(|(id, _)| *id == world.id());
         if !known {
             self.state = Some((world.id(), SystemState::new(world)));

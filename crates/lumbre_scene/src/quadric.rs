@@ -11,7 +11,8 @@ use thiserror::Error;
 pub struct Quadric {
     /// The shape.
     pub shape: QuadricShape,
-    /// Minimum and maximum corner of a box in local space; the surface outside of it is cut away.
+    /// Minimum and maximum corner of a box in local space; the surface outside of it is cut away. Components
+    /// may be infinite, where the box is open.
     pub trim: Option<[DVec3; 2]>,
 }
 
@@ -55,17 +56,19 @@ pub enum QuadricShape {
 /// Why a quadric is invalid.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum QuadricError {
-    /// A length is not a positive finite number.
-    #[error("{field} is {value}; give metres greater than 0")]
+    /// A length is not a positive number up to [`Quadric::MAX_VALUE`].
+    #[error("{field} is {value}; give metres greater than 0, and at most 1e100")]
     Length {
         /// The name of the field.
         field: &'static str,
         /// Its value.
         value: f64,
     },
-    /// The coefficients of a general quadric define no surface: a to i are all 0, or one of a to j is not
-    /// finite.
-    #[error("coefficients are all 0, or not all finite, but for the last; give an equation that has points")]
+    /// The coefficients of a general quadric define no surface: a to i are all 0, or one of a to j is NaN or
+    /// beyond [`Quadric::MAX_VALUE`].
+    #[error(
+        "coefficients a to i are all 0, or one of a to j is not a number up to 1e100; give an equation that has points"
+    )]
     NoSurface,
     /// The trim box is empty.
     #[error("the trim's min is not below its max; give min and max of a box")]
@@ -73,6 +76,9 @@ pub enum QuadricError {
 }
 
 impl Quadric {
+    /// The largest absolute value of a length or coefficient, so that its square is finite in f64.
+    pub const MAX_VALUE: f64 = 1e100;
+
     /// A shape without a trim box.
     pub fn new(shape: QuadricShape) -> Self {
         Self { shape, trim: None }
@@ -88,7 +94,7 @@ impl Quadric {
     /// # Errors
     /// [`QuadricError`] for the first fault found.
     pub fn validate(&self) -> Result<(), QuadricError> {
-        let length = |field: &'static str, value: f64| match value > 0.0 && value.is_finite() {
+        let length = |field: &'static str, value: f64| match value > 0.0 && value <= Self::MAX_VALUE {
             true => Ok(()),
             false => Err(QuadricError::Length { field, value }),
         };
@@ -100,8 +106,8 @@ impl Quadric {
                 length("height", height)?;
             }
             QuadricShape::General { coefficients } => {
-                let finite = coefficients.iter().all(|value| value.is_finite());
-                if !finite || coefficients[..9].iter().all(|&value| value == 0.0) {
+                let representable = coefficients.iter().all(|value| value.abs() <= Self::MAX_VALUE);
+                if !representable || coefficients[..9].iter().all(|&value| value == 0.0) {
                     return Err(QuadricError::NoSurface);
                 }
             }
@@ -145,11 +151,18 @@ mod tests {
             Err(QuadricError::Length { field: "radius", value: 0.0 })
         );
         assert!(Quadric::sphere(f64::NAN).validate().is_err());
+        assert!(Quadric::sphere(2.0 * Quadric::MAX_VALUE).validate().is_err());
         let general = |coefficients| Quadric::new(QuadricShape::General { coefficients }).validate();
         assert_eq!(general([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), Err(QuadricError::NoSurface));
         assert_eq!(general([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0]), Ok(()));
         let trim = Some([DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0)]);
         assert_eq!(Quadric { trim, ..Quadric::sphere(1.0) }.validate(), Err(QuadricError::Trim));
+        let half_space = Some([DVec3::NEG_INFINITY.with_y(0.0), DVec3::INFINITY]);
+        assert_eq!(Quadric { trim: half_space, ..Quadric::sphere(1.0) }.validate(), Ok(()));
+        for nowhere in [[DVec3::INFINITY; 2], [DVec3::NEG_INFINITY; 2], [DVec3::ZERO, DVec3::NAN]] {
+            let cut = Quadric { trim: Some(nowhere), ..Quadric::sphere(1.0) };
+            assert_eq!(cut.validate(), Err(QuadricError::Trim));
+        }
     }
 
     #[test]

@@ -290,34 +290,34 @@ mod tests {
 
     #[test]
     fn faults_are_named() {
-        use IrradianceVolumeError as Fault;
+        use IrradianceVolumeError as VolumeError;
         let fine = volume(&[1.0, 3.0]);
         assert_eq!(fine.validate(), Ok(()));
         let empty = IrradianceVolume { resolution: UVec3::ZERO, ..volume(&[]) };
-        assert!(matches!(empty.validate(), Err(Fault::Cubes { found: 0, .. })));
+        assert!(matches!(empty.validate(), Err(VolumeError::Cubes { found: 0, .. })));
         let short = IrradianceVolume { resolution: UVec3::splat(2), ..fine.clone() };
-        assert!(matches!(short.validate(), Err(Fault::Cubes { found: 2, .. })));
+        assert!(matches!(short.validate(), Err(VolumeError::Cubes { found: 2, .. })));
         // The product of the sizes overflows 64 bits.
         let huge = IrradianceVolume { resolution: UVec3::MAX, ..fine.clone() };
-        assert!(matches!(huge.validate(), Err(Fault::Cubes { .. })));
+        assert!(matches!(huge.validate(), Err(VolumeError::Cubes { .. })));
         let long = volume(&vec![1.0; 2049]);
-        assert!(matches!(long.validate(), Err(Fault::TooManyCells { .. })));
+        assert!(matches!(long.validate(), Err(VolumeError::TooManyCells { .. })));
         let mut dark = volume(&[1.0, f32::NAN]);
-        assert!(matches!(dark.validate(), Err(Fault::NotFinite { cube: 1, .. })));
+        assert!(matches!(dark.validate(), Err(VolumeError::NotFinite { cube: 1, .. })));
         dark.cubes[1].0[3].y = f32::INFINITY;
         assert!(dark.validate().is_err());
         let marks = IrradianceVolume { inside: vec![true], ..fine.clone() };
-        assert_eq!(marks.validate(), Err(Fault::Inside { found: 1, cells: 2 }));
+        assert_eq!(marks.validate(), Err(VolumeError::Inside { found: 1, cells: 2 }));
 
         let placed = |transform: Option<DAffine3>| {
             IrradianceVolume::place(fine.resolution, transform.map(GlobalTransform).as_ref()).err()
         };
         assert_eq!(placed(Some(DAffine3::IDENTITY)), None);
-        assert_eq!(placed(None), Some(Fault::NoPlace));
-        assert_eq!(placed(Some(DAffine3::from_translation(DVec3::NAN))), Some(Fault::NoPlace));
-        assert_eq!(placed(Some(DAffine3::from_rotation_y(0.1))), Some(Fault::Rotated));
+        assert_eq!(placed(None), Some(VolumeError::NoPlace));
+        assert_eq!(placed(Some(DAffine3::from_translation(DVec3::NAN))), Some(VolumeError::NoPlace));
+        assert_eq!(placed(Some(DAffine3::from_rotation_y(0.1))), Some(VolumeError::Rotated));
         let flat = DVec3::new(1.0, 0.0, 1.0);
-        assert_eq!(placed(Some(DAffine3::from_scale(flat))), Some(Fault::Flat { size: flat }));
-        assert!(matches!(placed(Some(DAffine3::from_scale(DVec3::ZERO))), Some(Fault::Flat { .. })));
+        assert_eq!(placed(Some(DAffine3::from_scale(flat))), Some(VolumeError::Flat { size: flat }));
+        assert!(matches!(placed(Some(DAffine3::from_scale(DVec3::ZERO))), Some(VolumeError::Flat { .. })));
     }
 }

@@ -210,6 +210,14 @@ fn instances_are_nodes() {
     assert_eq!(report.nodes.len(), 4);
     assert!(report.notes.iter().any(|note| note.text.contains("3 instances")), "{:?}", report.notes);
 
+    // The node's exact surface is that of each instance, and not of the node, which has no mesh any more.
+    let mut balls = instanced(&[0.0; 9], &[0.0, 0.0, 0.0, 1.0].repeat(3));
+    balls.root["nodes"][0]["extensions"]["LUMBRE_quadric"] = json!({"kind": "sphere"});
+    let (mut world, report) = balls.load().unwrap();
+    let found: Vec<_> = world.query::<&Quadric>().iter(&world).cloned().collect();
+    assert_eq!(found, vec![Quadric::sphere(1.0); 3]);
+    assert!(report.notes.iter().all(|note| !note.text.contains("LUMBRE_quadric")), "{:?}", report.notes);
+
     let problem = instanced(&[0.0; 9], &[0., 0., 0., 1.]).problem().to_string();
     assert!(
         problem.contains("nodes[0] (instanced): EXT_mesh_gpu_instancing.ROTATION")
@@ -226,6 +234,23 @@ fn instances_are_nodes() {
     }
     let problem = many.problem();
     assert!(matches!(problem, LoadProblem::TooLarge { .. }), "{problem}");
+}
+
+/// Instances and meshes are charged to one limit: what the instances take is not available for the meshes.
+#[test]
+fn one_limit_covers_instances_and_meshes() {
+    let _alone = MEASURING.lock();
+    let file = instanced(&[0.0; 9], &[0.0, 0.0, 0.0, 1.0].repeat(3)).glb();
+    // The least limit with which the file is loaded.
+    let loads = |bytes| {
+        let limits = LoadLimits { decoded_bytes: Some(bytes), ..LoadLimits::default() };
+        load_slice_within(&mut World::new(), &file, "test.glb", None, limits).is_ok()
+    };
+    let least = (0..1 << 14).collect::<Vec<u64>>().partition_point(|&bytes| !loads(bytes));
+    // An instance is counted as 1 KiB and 28 bytes of its attributes; a square has 4 vertices and 2 triangles.
+    let instances = 3 * (1024 + 3 * 4 + 4 * 4);
+    let square = 4 * 12 + 6 * 4;
+    assert!(least >= instances + square, "{least}");
 }
 
 /// SplitMix64 pseudo-random numbers.

@@ -155,11 +155,11 @@ fn metallic_roughness_keeps_its_energy_and_coefficients_are_bare() {
         only::<Material>(&mut world).lobe
     };
     let phong = |value: Value| json!({"extensions": {"LUMBRE_materials_phong": value}});
-    assert_eq!(lobe(json!({})), Lobe::EnergyKeeping);
+    assert_eq!(lobe(json!({})), Lobe::EnergyConserving);
     assert_eq!(lobe(phong(json!({"specular": [0.5, 0.5, 0.5], "shininess": 10.0}))), Lobe::Bare);
-    assert_eq!(lobe(phong(json!({"shininess": 10.0, "lobe": "energy-keeping"}))), Lobe::EnergyKeeping);
+    assert_eq!(lobe(phong(json!({"shininess": 10.0, "lobe": "energy-keeping"}))), Lobe::EnergyConserving);
     let mapped = json!({"pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}}});
-    assert_eq!(lobe(mapped), Lobe::EnergyKeeping);
+    assert_eq!(lobe(mapped), Lobe::EnergyConserving);
     let message = square(phong(json!({"lobe": "bar"})), |_, _| {}).load().unwrap_err().to_string();
     assert!(message.contains("LUMBRE_materials_phong.lobe") && message.contains("bare"), "{message}");
 }

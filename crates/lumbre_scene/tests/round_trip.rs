@@ -119,7 +119,7 @@ fn everything() -> World {
             mirror: Vec3::splat(0.1),
             transmission: Vec3::new(0.0, 0.2, 0.0),
             ior: 1.33,
-            lobe: lumbre_optics::Lobe::EnergyKeeping,
+            lobe: lumbre_optics::Lobe::EnergyConserving,
             distribution: Distribution::Gaussian,
             fresnel: Fresnel::Conductor {
                 eta: Vec3::new(0.17, 0.42, 1.38),
@@ -304,6 +304,29 @@ fn a_world_made_in_code() {
 }
 
 #[test]
+fn atlases_keep_their_names_however_often_they_are_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = |name: &str| {
+        let (width, height, encoding) = (1, 1, LightmapEncoding::Rgb32Float);
+        let (name, texels) = (name.to_owned(), vec![Vec3::ONE]);
+        Lightmap { image: Arc::new(LightmapImage { name, width, height, texels, encoding }) }
+    };
+    let mut world = World::new();
+    let atlas = map("atlas-1.lightmap.exr");
+    for (name, lightmap) in [("floor", atlas.clone()), ("wall", atlas), ("roof", map("roof.lightmap.exr"))] {
+        world.spawn((Name::new(name), Mesh(triangle(0.0)), Transform::IDENTITY, lightmap));
+    }
+    for name in ["hall.glb", "hall.glb", "copy.gltf", "copy.gltf"] {
+        let path = folder.path().join(name);
+        save(&mut world, &path).unwrap();
+        let maps = path.with_extension("lightmaps");
+        assert_eq!(names_in(&maps), ["atlas-1.exr", "roof.exr"], "{name}");
+        world = World::new();
+        load(&mut world, &path).unwrap();
+    }
+}
+
+#[test]
 fn what_cannot_be_saved_is_named_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let save_one = |bundle: (Name, Transform, Light), name: &str| {
@@ -329,6 +352,11 @@ fn what_cannot_be_saved_is_named_and_leaves_nothing() {
     world.spawn((Name::new("shard"), Mesh(Arc::new(broken))));
     let error = save(&mut world, &folder.path().join("a.glb")).unwrap_err();
     assert!(matches!(&error, SaveError::Mesh { place, .. } if place == "shard"), "{error}");
+    let mut world = World::new();
+    world.spawn((Name::new("ball"), Mesh(triangle(0.0)), Quadric::sphere(f64::NAN)));
+    let error = save(&mut world, &folder.path().join("a.glb")).unwrap_err();
+    assert!(matches!(&error, SaveError::Quadric { place, .. } if place == "ball"), "{error}");
+    assert!(error.to_string().contains("LUMBRE_quadric") && error.to_string().contains("radius"), "{error}");
     assert_eq!(names_in(folder.path()), Vec::<String>::new());
 }
 

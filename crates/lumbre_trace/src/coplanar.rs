@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use crate::geometry::{Crossing, Meeting, SpaceRay};
+use crate::geometry::{Candidate, Hit, SpaceRay};
 use crate::scene::{Passage, Scene};
 use crate::surface_point::SurfacePoint;
 
@@ -22,23 +22,23 @@ pub(crate) fn nearest_surface(
     scene: &Scene,
     ray: &SpaceRay,
     farthest: f64,
-    accept: impl Fn(&Crossing) -> bool,
-) -> Option<(Meeting, SurfacePoint)> {
+    accept: impl Fn(&Candidate) -> bool,
+) -> Option<(Hit, SurfacePoint)> {
     let found = scene.geometry.closest(ray, farthest, &accept)?;
     let point = SurfacePoint::new(scene, ray, &found);
-    if !scene.is_open(found.crossing.object, true) {
+    if !scene.is_open(found.candidate.object, true) {
         return Some((found, point));
     }
     let place = Place::of(ray, &point);
-    let opaque = scene.geometry.closest(&place.around, 2.0 * place.reach, |crossing| {
-        scene.passage(crossing.object) == Passage::Closed && accept(crossing)
+    let opaque = scene.geometry.closest(&place.around, 2.0 * place.reach, |candidate| {
+        scene.passage(candidate.object) == Passage::Closed && accept(candidate)
     });
     let Some(opaque) = opaque.filter(|opaque| place.holds(scene, opaque)) else {
         return Some((found, point));
     };
     let distance = (point.distance - place.reach + opaque.distance).max(0.0);
-    let meeting = Meeting { distance, ..opaque };
-    Some((meeting, SurfacePoint::new(scene, ray, &meeting)))
+    let hit = Hit { distance, ..opaque };
+    Some((hit, SurfacePoint::new(scene, ray, &hit)))
 }
 
 /// Returns the other solids that have a coplanar surface at a point of a solid: glass that touches glass is
@@ -51,16 +51,16 @@ pub(crate) fn coplanar_solids(
     let mut found: Vec<(usize, bool, f64)> = Vec::new();
     let place = Place::of(ray, point);
     while found.len() < MAX_TOGETHER {
-        let next = scene.geometry.closest(&place.around, 2.0 * place.reach, |crossing| {
-            crossing.object != point.object
-                && scene.is_solid(crossing.object)
-                && found.iter().all(|(own, ..)| *own != crossing.object)
+        let next = scene.geometry.closest(&place.around, 2.0 * place.reach, |candidate| {
+            candidate.object != point.object
+                && scene.is_solid(candidate.object)
+                && found.iter().all(|(own, ..)| *own != candidate.object)
         });
-        let Some(meeting) = next.filter(|meeting| place.holds(scene, meeting)) else { break };
-        let extent = SurfacePoint::new(scene, &place.around, &meeting).extent;
+        let Some(hit) = next.filter(|hit| place.holds(scene, hit)) else { break };
+        let extent = SurfacePoint::new(scene, &place.around, &hit).extent;
         // Slightly larger, so that the caller sees that several surfaces were crossed and offsets the
         // transmitted ray by more.
-        found.push((meeting.crossing.object, meeting.crossing.front, extent.max(point.extent) * 1.000_001));
+        found.push((hit.candidate.object, hit.candidate.front, extent.max(point.extent) * 1.000_001));
     }
     found
 }
@@ -86,7 +86,7 @@ impl Place {
 
     /// Returns true if the surfaces are parallel. Where the edge of one only touches the other, rays hit them
     /// one after the other.
-    fn holds(&self, scene: &Scene, meeting: &Meeting) -> bool {
-        SurfacePoint::new(scene, &self.around, meeting).geometric.dot(self.normal) >= PARALLEL
+    fn holds(&self, scene: &Scene, hit: &Hit) -> bool {
+        SurfacePoint::new(scene, &self.around, hit).geometric.dot(self.normal) >= PARALLEL
     }
 }

@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::coplanar::nearest_surface;
-use crate::geometry::Crossing;
+use crate::geometry::Candidate;
 use crate::surface_point::SurfacePoint;
 use crate::tiles::for_every_pixel;
 use crate::view::{View, pixel_middle};
@@ -91,6 +91,6 @@ impl FirstHits {
 
 fn first_point(view: &View, place: DVec2) -> Option<SurfacePoint> {
     let (camera, scene) = (view.camera.through(place), &view.scene);
-    let seen = |crossing: &Crossing| scene.is_seen(crossing);
+    let seen = |candidate: &Candidate| scene.is_seen(candidate);
     nearest_surface(scene, &camera.ray, camera.farthest, seen).map(|(_, point)| point)
 }

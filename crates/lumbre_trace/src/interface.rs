@@ -12,7 +12,7 @@ use crate::surface_point::SurfacePoint;
 
 /// The rays that go on from a point of a surface that mirrors or transmits.
 #[derive(Clone, Debug)]
-pub(crate) struct Division {
+pub(crate) struct RaySplit {
     /// Factor on the radiance from the mirrored direction: k_r, plus the part of k_t that Fresnel's equations
     /// or total reflection send back.
     pub mirrored: DVec3,
@@ -30,8 +30,8 @@ pub(crate) struct Division {
     pub extent: f64,
 }
 
-impl Division {
-    /// Divides a ray in `media` that hits a point of a surface which mirrors or transmits.
+impl RaySplit {
+    /// Splits a ray in `media` that hits a point of a surface which mirrors or transmits.
     pub fn new(scene: &Scene, ray: &SpaceRay, point: &SurfacePoint, media: &MediumStack) -> Self {
         let object = &scene.objects[point.object];
         let viewer = -ray.direction;
@@ -39,7 +39,7 @@ impl Division {
         let cosine = normal.dot(viewer).clamp(0.0, 1.0);
         let mirror_direction = mirror(normal, viewer, point.geometric);
         let (mut mirrored, mut passing) = (object.mirror(), object.transmission());
-        let mut division = Self {
+        let mut split = Self {
             mirrored,
             mirror_direction,
             transmitted: DVec3::ZERO,
@@ -49,13 +49,13 @@ impl Division {
             extent: point.extent,
         };
         if passing == DVec3::ZERO {
-            return division;
+            return split;
         }
         if object.medium.thin {
             let reflected = reflected_by_sheet(object, cosine);
-            division.mirrored = mirrored + passing * reflected;
-            division.transmitted = passing * (1.0 - reflected);
-            return division;
+            split.mirrored = mirrored + passing * reflected;
+            split.transmitted = passing * (1.0 - reflected);
+            return split;
         }
         let here = media.before(point.object, object, point.front);
         let mut behind = here.across(point.object, object, point.front);
@@ -63,23 +63,23 @@ impl Division {
             let solid = &scene.objects[other];
             behind = behind.before(other, solid, front).across(other, solid, front);
             passing *= solid.transmission();
-            division.extent = division.extent.max(extent);
+            split.extent = split.extent.max(extent);
         }
-        division.eta = behind.index() / here.index();
-        let through = transmitted_direction(normal, viewer, division.eta);
+        split.eta = behind.index() / here.index();
+        let through = transmitted_direction(normal, viewer, split.eta);
         let leaves = through.dot(point.geometric) < 0.0;
         if through == DVec3::ZERO || !leaves {
             mirrored += passing;
-            division.mirrored = mirrored;
-            return division;
+            split.mirrored = mirrored;
+            return split;
         }
         let fresnel = object.medium.fresnel;
-        let reflected = if fresnel { fresnel_dielectric(cosine, division.eta) } else { 0.0 };
-        division.mirrored = mirrored + passing * reflected;
-        division.transmitted = passing * (1.0 - reflected);
-        division.transmitted_direction = through;
-        division.behind = behind;
-        division
+        let reflected = if fresnel { fresnel_dielectric(cosine, split.eta) } else { 0.0 };
+        split.mirrored = mirrored + passing * reflected;
+        split.transmitted = passing * (1.0 - reflected);
+        split.transmitted_direction = through;
+        split.behind = behind;
+        split
     }
 
     /// Returns the mirrored ray.

@@ -4,7 +4,7 @@
 //! ```text
 //!   World ─► Scene: objects, lights, polygons ─► Geometry: triangles (lumbre_rays) + quadrics
 //!                                                    │
-//!   camera_ray ─► SpaceRay ──────────────────────────┴──► Meeting ─► SurfacePoint: normals, textures, coefficients
+//!   camera_ray ─► SpaceRay ──────────────────────────┴──► Hit ─────► SurfacePoint: normals, textures, coefficients
 //!      ▲                                                                  │
 //!      │ film: filters,          ┌────────────────────────────────────────┤
 //!      │ samples, errors         ▼                                        ▼

@@ -42,25 +42,25 @@ impl Lobes {
     pub fn new(model: ReflectionModel, surface: &SurfaceSample, normal: DVec3, viewer: DVec3) -> Self {
         let n = surface.shininess;
         let exponent = model_exponent(model, surface.lobe, n);
-        let keeps_energy = surface.lobe == Lobe::EnergyKeeping;
+        let conserves_energy = surface.lobe == Lobe::EnergyConserving;
         let shape = match model {
             ReflectionModel::Phong => Shape::Mirrored { exponent },
             ReflectionModel::Blinn => Shape::HalfVector { exponent: n },
-            ReflectionModel::Blinn4n | ReflectionModel::BlinnMatched if keeps_energy => {
+            ReflectionModel::Blinn4n | ReflectionModel::BlinnMatched if conserves_energy => {
                 Shape::HalfVector { exponent: n }
             }
             ReflectionModel::Blinn4n | ReflectionModel::BlinnMatched => {
                 Shape::HalfVector { exponent: 4.0 * n }
             }
             ReflectionModel::TorranceSparrow
-                if keeps_energy || surface.distribution == Distribution::TrowbridgeReitz =>
+                if conserves_energy || surface.distribution == Distribution::TrowbridgeReitz =>
             {
                 Shape::LongTail { alpha_squared: 2.0 / (n + 2.0) }
             }
             ReflectionModel::TorranceSparrow => Shape::HalfVector { exponent: n },
         };
         let diffuse = surface.diffuse.element_sum();
-        let share = if keeps_energy { 1.0 } else { 2.0 / (n + 2.0) };
+        let share = if conserves_energy { 1.0 } else { 2.0 / (n + 2.0) };
         let shiny = surface.specular.element_sum() * share;
         let specular = match (diffuse > 0.0, surface.specular != DVec3::ZERO) {
             (_, false) => 0.0,
@@ -79,7 +79,7 @@ impl Lobes {
     /// transmitted rays.
     pub fn albedo(&self) -> f64 {
         let share = match self.surface.lobe {
-            Lobe::EnergyKeeping => 1.0,
+            Lobe::EnergyConserving => 1.0,
             Lobe::Bare => 2.0 / (self.surface.shininess + 2.0),
         };
         (self.surface.diffuse + self.surface.specular * share).element_sum() / 3.0
@@ -195,7 +195,7 @@ mod tests {
     fn every_lobe() -> Vec<Lobes> {
         let mut lobes = Vec::new();
         for &model in ReflectionModel::ALL {
-            for lobe in [Lobe::Bare, Lobe::EnergyKeeping] {
+            for lobe in [Lobe::Bare, Lobe::EnergyConserving] {
                 let spread = model == ReflectionModel::TorranceSparrow && lobe == Lobe::Bare;
                 for &distribution in if spread { Distribution::ALL } else { &Distribution::ALL[..1] } {
                     for shininess in [3.0, 40.0, 900.0] {

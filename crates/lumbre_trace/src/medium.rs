@@ -38,11 +38,11 @@ impl MediumStack {
         let mut ray = SpaceRay::new(point, direction);
         for _ in 0..MAX_SURFACES {
             let found =
-                scene.geometry.closest(&ray, f64::INFINITY, |crossing| scene.is_solid(crossing.object));
-            let Some(meeting) = found else { break };
-            let at = crate::surface_point::SurfacePoint::new(scene, &ray, &meeting);
-            let object = meeting.crossing.object;
-            if meeting.crossing.front {
+                scene.geometry.closest(&ray, f64::INFINITY, |candidate| scene.is_solid(candidate.object));
+            let Some(hit) = found else { break };
+            let at = crate::surface_point::SurfacePoint::new(scene, &ray, &hit);
+            let object = hit.candidate.object;
+            if hit.candidate.front {
                 entered.push(object);
             } else if let Some(before) = entered.iter().rposition(|own| *own == object) {
                 entered.remove(before);

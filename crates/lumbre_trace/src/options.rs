@@ -54,7 +54,8 @@ pub struct TraceOptions {
     /// Replaces every object's specular reflection model.
     pub reflection: Option<ReflectionModel>,
     /// Largest number of mirrored and transmitted rays in succession. A path's diffuse and glossy reflections
-    /// count too. `None` means [`DEFAULT_DEPTH`] for the ray tree, and for paths that only Russian roulette
+    /// count too; at the last surface lights are still sampled, so that a path of depth 0 finds the light that
+    /// one surface reflects. `None` means [`DEFAULT_DEPTH`] for the ray tree, and for paths that only Russian roulette
     /// ends them.
     pub depth: Option<u32>,
     /// Rays of the ray tree whose weight in the pixel is below this in every channel are not traced; 0 to 1.

@@ -14,7 +14,7 @@ use crate::coplanar::nearest_surface;
 use crate::direct_light::shadow_ray;
 use crate::film::Sample;
 use crate::geometry::{Place, SpaceRay};
-use crate::interface::Division;
+use crate::interface::RaySplit;
 use crate::light_sampling::{LightSampler, emitted};
 use crate::light_terms::{LightTerms, Source};
 use crate::lobe_sampling::Lobes;
@@ -48,9 +48,9 @@ struct Walk {
     farthest: f64,
     media: MediumStack,
     throughput: DVec3,
-    /// The part of `throughput` that comes from refraction changing solid angles, 1/η² at each interface; it
-    /// is 1 again once the path has left the glass.
-    squeezed: f64,
+    /// The product of η² over the interfaces that the path was refracted at, by which refraction has lessened
+    /// `throughput`. It is 1 again once the path has left the glass.
+    eta_scale: f64,
     /// The radiance found so far.
     radiance: DVec3,
     /// The terms that the radiance is the sum of, if they are wanted.
@@ -101,7 +101,7 @@ impl<'a> Paths<'a> {
             farthest: camera.farthest,
             media,
             throughput: DVec3::ONE,
-            squeezed: 1.0,
+            eta_scale: 1.0,
             radiance: DVec3::ZERO,
             terms,
             last: None,
@@ -127,13 +127,14 @@ impl<'a> Paths<'a> {
     fn step(&self, walk: &mut Walk, numbers: &mut Numbers) -> Next {
         let scene = self.scene;
         walk.rays += 1;
-        let looks = walk.last.is_none();
-        // Rays from the eye, mirrors and glass pass the culled backs of single-sided surfaces, as a
-        // rasterizer does. Rays that carry light are blocked by them.
-        let found = nearest_surface(scene, &walk.ray, walk.farthest, |crossing| {
-            if looks { scene.is_seen(crossing) } else { scene.blocks(crossing) }
+        // Whether the ray comes from the eye, a mirror or glass.
+        let is_specular = walk.last.is_none();
+        // Such rays pass the culled backs of single-sided surfaces, as a rasterizer does. Rays that carry light
+        // are blocked by them.
+        let found = nearest_surface(scene, &walk.ray, walk.farthest, |candidate| {
+            if is_specular { scene.is_seen(candidate) } else { scene.blocks(candidate) }
         });
-        let Some((meeting, point)) = found else {
+        let Some((hit, point)) = found else {
             walk.escapes(scene);
             return Next::Ends;
         };
@@ -147,7 +148,7 @@ impl<'a> Paths<'a> {
             self.add_fog(walk, &point);
         }
         if object.material.unlit {
-            if looks {
+            if is_specular {
                 walk.brings(Source::Object(point.object), walk.reflections, point.surface.diffuse);
             }
             return Next::Ends;
@@ -155,7 +156,7 @@ impl<'a> Paths<'a> {
         if !(point.front || object.shows_back()) {
             return Next::Ends;
         }
-        self.add_emission(walk, &point, &meeting.crossing.place, since);
+        self.add_emission(walk, &point, &hit.candidate.place, since);
         self.scatter(walk, &point, since, numbers)
     }
 
@@ -198,37 +199,37 @@ impl<'a> Paths<'a> {
         let matt = !lobes.are_black() && point.normal.dot(viewer) > 0.0;
         let last = self.depth.is_some_and(|depth| walk.reflections >= depth);
         if matt {
-            self.ask_lights(walk, point, &lobes, last, numbers);
+            self.sample_lights(walk, point, &lobes, last, numbers);
         }
         if last {
             return Next::Ends;
         }
-        let divides = object.mirror() != DVec3::ZERO || object.transmission() != DVec3::ZERO;
-        let division = divides.then(|| Division::new(scene, &walk.ray, point, &walk.media));
+        let splits = object.mirror() != DVec3::ZERO || object.transmission() != DVec3::ZERO;
+        let split = splits.then(|| RaySplit::new(scene, &walk.ray, point, &walk.media));
         let mean = |color: DVec3| color.element_sum() / 3.0;
         let (mirrored, through) =
-            division.as_ref().map_or((0.0, 0.0), |found| (mean(found.mirrored), mean(found.transmitted)));
+            split.as_ref().map_or((0.0, 0.0), |found| (mean(found.mirrored), mean(found.transmitted)));
         let local = if matt { lobes.albedo().max(1e-3) } else { 0.0 };
         let total = local + mirrored + through;
         if total <= 0.0 {
             return Next::Ends;
         }
         let choice = numbers.next() * total;
-        if let Some(division) = division.filter(|_| choice >= local) {
+        if let Some(split) = split.filter(|_| choice >= local) {
             return if choice < local + mirrored {
-                walk.throughput *= division.mirrored * (total / mirrored);
-                walk.turns(division.mirrored_ray(point), None, numbers)
+                walk.throughput *= split.mirrored * (total / mirrored);
+                walk.turns(split.mirrored_ray(point), None, numbers)
             } else {
-                walk.throughput *= division.transmitted * (total / through);
+                walk.throughput *= split.transmitted * (total / through);
                 if object.medium.thin {
                     return walk.goes_straight(point, since);
                 }
                 // Refraction changes the solid angle of a beam, and its radiance with it, by 1/η².
-                let squeezed = 1.0 / (division.eta * division.eta);
-                walk.throughput *= squeezed;
-                walk.squeezed *= squeezed;
-                walk.media = division.behind.clone();
-                walk.turns(division.transmitted_ray(point), None, numbers)
+                let scale = split.eta * split.eta;
+                walk.throughput /= scale;
+                walk.eta_scale *= scale;
+                walk.media = split.behind.clone();
+                walk.turns(split.transmitted_ray(point), None, numbers)
             };
         }
         let direction = lobes.direction(numbers.next(), numbers.pair());
@@ -246,7 +247,7 @@ impl<'a> Paths<'a> {
     }
 
     /// Next-event estimation: adds the light of one sampled lamp and of one sampled emissive triangle.
-    fn ask_lights(
+    fn sample_lights(
         &self,
         walk: &mut Walk,
         point: &SurfacePoint,
@@ -278,8 +279,8 @@ impl<'a> Paths<'a> {
         let local = lobes.albedo().max(1e-3);
         let mut total = local;
         if object.mirror() != DVec3::ZERO || object.transmission() != DVec3::ZERO {
-            let division = Division::new(self.scene, &walk.ray, point, &walk.media);
-            total += (division.mirrored + division.transmitted).element_sum() / 3.0;
+            let split = RaySplit::new(self.scene, &walk.ray, point, &walk.media);
+            total += (split.mirrored + split.transmitted).element_sum() / 3.0;
         }
         lobes.density(direction) * local / total
     }
@@ -347,7 +348,7 @@ impl Walk {
         if self.reflections > SAFE_DEPTH {
             // By the power that the path carries: radiance is scaled in glass, but a path is worth no less
             // there.
-            let chance = (self.throughput.max_element() / self.squeezed).min(LIKELIEST);
+            let chance = (self.throughput.max_element() * self.eta_scale).min(LIKELIEST);
             if numbers.next() >= chance {
                 return Next::Ends;
             }
@@ -365,7 +366,7 @@ mod tests {
     /// scaled.
     #[test]
     fn chance_ends_paths_by_their_power_whatever_they_are_in() {
-        let goes_on = |throughput: f64, squeezed: f64| {
+        let goes_on = |throughput: f64, eta_scale: f64| {
             let ray = SpaceRay::new(DVec3::ZERO, DVec3::Z);
             let count = 4096;
             let ends = |sample| {
@@ -374,7 +375,7 @@ mod tests {
                     farthest: f64::INFINITY,
                     media: MediumStack::default(),
                     throughput: DVec3::splat(throughput),
-                    squeezed,
+                    eta_scale,
                     radiance: DVec3::ZERO,
                     terms: LightTerms::new(false),
                     last: None,
@@ -388,11 +389,11 @@ mod tests {
             };
             (0..count).filter(|&sample| ends(sample)).count() as f64 / f64::from(count)
         };
-        let squeezed = 1.0 / (1.5 * 1.5);
+        let glass = 1.5 * 1.5;
         for (power, chance) in [(1.0, LIKELIEST), (0.5, 0.5), (0.1, 0.1)] {
-            for squeezed in [1.0, squeezed, 1.0 / squeezed] {
-                let found = goes_on(power * squeezed, squeezed);
-                assert!((found - chance).abs() < 2e-3, "{power} in {squeezed}: {found} for {chance}");
+            for eta_scale in [1.0, glass, 1.0 / glass] {
+                let found = goes_on(power / eta_scale, eta_scale);
+                assert!((found - chance).abs() < 2e-3, "{power} in {eta_scale}: {found} for {chance}");
             }
         }
     }

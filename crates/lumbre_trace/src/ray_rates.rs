@@ -46,7 +46,7 @@ impl RayRates {
         let bare = scene.geometry.hierarchy();
         let rays = PictureRays::of(view);
         let seen = |(ray, farthest): &(SpaceRay, f64)| {
-            scene.geometry.closest(ray, *farthest, |crossing| scene.is_seen(crossing)).is_some()
+            scene.geometry.closest(ray, *farthest, |candidate| scene.is_seen(candidate)).is_some()
         };
         let meets = |ray: &Ray| bare.closest_hit(ray).is_some();
         let primary = rate(rounds, (&rays.primary, seen), (&rays.bare_primary, meets));
@@ -90,8 +90,8 @@ impl<'a> PictureRays<'a> {
             rays.primary.push((camera.ray, camera.farthest));
             rays.bare_primary.push(camera.ray.for_triangles(camera.farthest));
             let seen = scene.geometry.closest(&camera.ray, camera.farthest, |at| scene.is_seen(at));
-            if let Some(meeting) = seen {
-                rays.add_shadow_rays(view, &SurfacePoint::new(scene, &camera.ray, &meeting));
+            if let Some(hit) = seen {
+                rays.add_shadow_rays(view, &SurfacePoint::new(scene, &camera.ray, &hit));
             }
         }
         rays

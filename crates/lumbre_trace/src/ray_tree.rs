@@ -10,7 +10,7 @@ use crate::camera_ray::CameraRays;
 use crate::coplanar::nearest_surface;
 use crate::direct_light::{DirectLight, Lighting, direct_light};
 use crate::geometry::SpaceRay;
-use crate::interface::Division;
+use crate::interface::RaySplit;
 use crate::light_terms::{BOUNCED, LightTerms, Source};
 use crate::medium::MediumStack;
 use crate::scene::Scene;
@@ -110,7 +110,7 @@ impl RayTree<'_> {
         *left = left.saturating_sub(1);
         let own_terms = seen.terms.len();
         let scene = self.scene;
-        let found = nearest_surface(scene, &twig.ray, twig.farthest, |crossing| scene.is_seen(crossing));
+        let found = nearest_surface(scene, &twig.ray, twig.farthest, |candidate| scene.is_seen(candidate));
         let Some((_, point)) = found else {
             // An absorbing medium without an end leaves nothing in the channels that it absorbs.
             let background = scene.settings.shown_background().as_dvec3();
@@ -187,9 +187,9 @@ impl RayTree<'_> {
             (true, false) => self.camera.basis.z_axis,
             _ => -twig.ray.direction,
         };
-        let divides = object.mirror() != DVec3::ZERO || object.transmission() != DVec3::ZERO;
-        let division = divides.then(|| Division::new(scene, &twig.ray, point, twig.media));
-        let (behind, eta) = division.as_ref().map_or((twig.media, 1.0), |found| (&found.behind, found.eta));
+        let splits = object.mirror() != DVec3::ZERO || object.transmission() != DVec3::ZERO;
+        let split = splits.then(|| RaySplit::new(scene, &twig.ray, point, twig.media));
+        let (behind, eta) = split.as_ref().map_or((twig.media, 1.0), |found| (&found.behind, found.eta));
         let light: DirectLight = direct_light(scene, point, viewer, (twig.media, behind, eta), self.lighting);
         seen.rays += light.rays;
         let mut radiance = light.total();
@@ -200,32 +200,32 @@ impl RayTree<'_> {
         if seen.terms.are_wanted() {
             self.add_terms(&mut seen.terms, point, &light, twig.turns);
         }
-        let Some(division) = division else { return radiance };
+        let Some(split) = split else { return radiance };
         let share = point.coverage;
-        if division.mirrored != DVec3::ZERO {
+        if split.mirrored != DVec3::ZERO {
             let next = Twig {
-                ray: division.mirrored_ray(point),
+                ray: split.mirrored_ray(point),
                 farthest: f64::INFINITY,
                 media: twig.media,
-                weight: twig.weight * division.mirrored * clear * share,
+                weight: twig.weight * split.mirrored * clear * share,
                 depth: twig.depth + 1,
                 turns: twig.turns + 1,
                 first: false,
             };
             radiance +=
-                self.branch_off(Kind::Mirrored, next, division.mirrored, left, seen, record.as_deref_mut());
+                self.branch_off(Kind::Mirrored, next, split.mirrored, left, seen, record.as_deref_mut());
         }
-        if division.transmitted != DVec3::ZERO {
+        if split.transmitted != DVec3::ZERO {
             let next = Twig {
-                ray: division.transmitted_ray(point),
+                ray: split.transmitted_ray(point),
                 farthest: f64::INFINITY,
-                media: &division.behind,
-                weight: twig.weight * division.transmitted * clear * share,
+                media: &split.behind,
+                weight: twig.weight * split.transmitted * clear * share,
                 depth: twig.depth + 1,
                 turns: twig.turns + u32::from(!object.medium.thin),
                 first: false,
             };
-            radiance += self.branch_off(Kind::Transmitted, next, division.transmitted, left, seen, record);
+            radiance += self.branch_off(Kind::Transmitted, next, split.transmitted, left, seen, record);
         }
         radiance
     }

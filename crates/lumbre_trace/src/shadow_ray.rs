@@ -41,15 +41,15 @@ pub(crate) fn transmittance(
     // Set if a surface was passed that transmits part of the light. A ray that is not blocked tests all
     // surfaces on its way.
     let through = Cell::new(false);
-    let hidden = scene.geometry.any_between(ray, distance, |crossing| {
-        if bulbs.contains(&crossing.object) {
+    let hidden = scene.geometry.any_between(ray, distance, |candidate| {
+        if bulbs.contains(&candidate.object) {
             return false;
         }
-        if open(crossing.object) {
+        if open(candidate.object) {
             through.set(true);
             return false;
         }
-        scene.blocks(crossing)
+        scene.blocks(candidate)
     });
     if hidden {
         return (DVec3::ZERO, 1);
@@ -61,15 +61,15 @@ pub(crate) fn transmittance(
     let (mut ray, mut travelled, mut media) = (*ray, 0.0, media.clone());
     for _ in 0..MAX_SURFACES {
         rays += 1;
-        let next = scene.geometry.closest(&ray, distance - travelled, |crossing| {
-            open(crossing.object) && !bulbs.contains(&crossing.object)
+        let next = scene.geometry.closest(&ray, distance - travelled, |candidate| {
+            open(candidate.object) && !bulbs.contains(&candidate.object)
         });
-        let Some(meeting) = next else {
+        let Some(hit) = next else {
             return (left * media.transmittance(distance - travelled), rays);
         };
-        let point = SurfacePoint::new(scene, &ray, &meeting);
+        let point = SurfacePoint::new(scene, &ray, &hit);
         let object = &scene.objects[point.object];
-        let front = meeting.crossing.front;
+        let front = hit.candidate.front;
         let solid = scene.is_solid(point.object);
         let here = if solid { media.before(point.object, object, front) } else { media.clone() };
         left *= here.transmittance(point.distance);

@@ -7,7 +7,7 @@ use lumbre_optics::{
     transformed_tangent, try_normalize,
 };
 
-use crate::geometry::{Meeting, Place, SpaceRay};
+use crate::geometry::{Hit, Place, SpaceRay};
 use crate::scene::{Object, Scene, sample_color, sample_lightmap, sample_linear};
 
 /// A hit point on a surface, seen along a ray.
@@ -44,24 +44,16 @@ const TRUSTED: f64 = 1e-3;
 
 impl SurfacePoint {
     /// Evaluates the surface where a ray hits it.
-    pub fn new(scene: &Scene, ray: &SpaceRay, meeting: &Meeting) -> Self {
-        let crossing = &meeting.crossing;
-        let object = &scene.objects[crossing.object];
-        match crossing.place {
-            Place::Triangle { triangle, weights } => {
-                Self::in_triangle(object, ray, meeting, triangle, weights)
-            }
-            Place::Exact { point, normal } => Self::on_exact_surface(object, ray, meeting, point, normal),
+    pub fn new(scene: &Scene, ray: &SpaceRay, hit: &Hit) -> Self {
+        let candidate = &hit.candidate;
+        let object = &scene.objects[candidate.object];
+        match candidate.place {
+            Place::Triangle { triangle, weights } => Self::in_triangle(object, ray, hit, triangle, weights),
+            Place::Exact { point, normal } => Self::on_exact_surface(object, ray, hit, point, normal),
         }
     }
 
-    fn in_triangle(
-        object: &Object,
-        ray: &SpaceRay,
-        meeting: &Meeting,
-        triangle: u32,
-        found: [f64; 2],
-    ) -> Self {
+    fn in_triangle(object: &Object, ray: &SpaceRay, hit: &Hit, triangle: u32, found: [f64; 2]) -> Self {
         let first = 3 * triangle as usize;
         let corners = object.corners([0, 1, 2].map(|next| object.shape.indices[first + next]));
         let [a, b, c] = corners;
@@ -69,13 +61,12 @@ impl SurfacePoint {
         let face = try_normalize(cross).unwrap_or(-ray.direction);
         // The hierarchy's corners are f32. The point is computed again in f64, so that long chains of mirrors
         // keep their digits.
-        let (distance, found) =
-            refined(ray, corners, cross, meeting.distance).unwrap_or((meeting.distance, found));
+        let (distance, found) = refined(ray, corners, cross, hit.distance).unwrap_or((hit.distance, found));
         let (vertices, weights) = object.vertices(triangle, found);
         let position = a * weights[0] + b * weights[1] + c * weights[2];
         let extent = corners.iter().fold(0.0_f64, |largest, corner| largest.max(corner.abs().max_element()));
 
-        let front = meeting.crossing.front;
+        let front = hit.candidate.front;
         let lit_as_front = front || !backs_are_lit(object);
         let shape = &object.shape;
         let smooth: DVec3 = (0..3)
@@ -143,7 +134,7 @@ impl SurfacePoint {
         let normal = facing_normal(normal, lit_as_front);
         let from_volume = object.volume_light(position, normal, surface.diffuse * unoccluded);
         Self {
-            object: meeting.crossing.object,
+            object: hit.candidate.object,
             position,
             distance,
             geometric: towards(face, ray),
@@ -155,25 +146,19 @@ impl SurfacePoint {
             baked,
             from_volume,
             extent,
-            triangle: meeting.triangle,
+            triangle: hit.triangle,
         }
     }
 
-    fn on_exact_surface(
-        object: &Object,
-        ray: &SpaceRay,
-        meeting: &Meeting,
-        position: DVec3,
-        normal: DVec3,
-    ) -> Self {
-        let front = meeting.crossing.front;
+    fn on_exact_surface(object: &Object, ray: &SpaceRay, hit: &Hit, position: DVec3, normal: DVec3) -> Self {
+        let front = hit.candidate.front;
         let lit_as_front = front || !backs_are_lit(object);
         let surface = SurfaceSample::new(&object.material, lit_as_front);
         let lit_normal = facing_normal(normal, lit_as_front);
         Self {
-            object: meeting.crossing.object,
+            object: hit.candidate.object,
             position,
-            distance: meeting.distance,
+            distance: hit.distance,
             geometric: towards(normal, ray),
             normal: lit_normal,
             front,

@@ -83,7 +83,7 @@ fn lobes_in_a_furnace_reflect_what_the_lighting_equation_reflects() {
     // A shiny floor under a uniform sky: paths against the lighting equation integrated over a grid on the
     // hemisphere.
     for model in [ReflectionModel::Phong, ReflectionModel::Blinn, ReflectionModel::TorranceSparrow] {
-        for lobe in [Lobe::Bare, Lobe::EnergyKeeping] {
+        for lobe in [Lobe::Bare, Lobe::EnergyConserving] {
             let front = Surface {
                 diffuse: Vec3::splat(0.2),
                 specular: Vec3::splat(0.6),

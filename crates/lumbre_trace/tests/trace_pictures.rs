@@ -144,18 +144,33 @@ fn a_light_alone_is_the_picture_without_the_others() {
 
 #[test]
 fn direct_light_of_paths_is_all_that_one_reflection_brings() {
-    // In this room nearly all light that paths of depth 1 find is direct.
-    let aovs = asked(&["direct"]);
-    let (picture, _) = draw(&mut room(), &TraceOptions { aovs, ..paths(32, 16) });
-    let (once, _) = draw(&mut room(), &TraceOptions { depth: Some(1), ..paths(32, 16) });
-    let direct = colors(&picture, "direct");
+    // A path of depth d has d turns, and samples the lights at its last surface too: at depth 0 it finds the light
+    // that one surface reflects, except the sky's, which is never sampled as a light.
+    let direct_of = |options: &TraceOptions, world: &mut World| {
+        let aovs = asked(&["direct"]);
+        let (picture, _) = draw(world, &TraceOptions { aovs, ..options.clone() });
+        (colors(&picture, "direct").to_vec(), picture.radiance)
+    };
     let sum = |pixels: &[DVec3]| pixels.iter().map(|pixel| pixel.element_sum()).sum::<f64>();
-    // At the last point of a limited path, light samples are not weighted against the path's own
-    // continuation: a different estimate of the same light.
-    let relative = sum(direct) / sum(&once.radiance) - 1.0;
-    println!("direct light over the light of one reflection: {:+.2} %", 100.0 * relative);
+    let [of_depth_0, of_depth_1, of_depth_2] =
+        [0, 1, 2].map(|depth| TraceOptions { depth: Some(depth), ..paths(32, 16) });
+    let mut without_sky = room();
+    without_sky.resource_mut::<SceneSettings>().sky = Vec3::ZERO;
+    let (direct, picture) = direct_of(&of_depth_0, &mut without_sky);
+    assert!(apart(&picture, &[&direct]) < 1e-12, "a path without turns finds direct light only");
+    let (with_weights, _) = direct_of(&paths(32, 16), &mut without_sky);
+    // Where a path ends, samples of emissive surfaces are not weighted against the path's own way to them: a
+    // different estimate of the same light.
+    let relative = sum(&direct) / sum(&with_weights) - 1.0;
+    println!("direct light of paths of depth 0 over that of all paths: {:+.2} %", 100.0 * relative);
     assert!(relative.abs() < 0.02, "{relative}");
-    assert!(sum(direct) < 0.95 * sum(&picture.radiance));
+    // From depth 1 on, all of it is found, the sky's too, and by the same samples: no depth changes it.
+    let (direct, picture) = direct_of(&of_depth_1, &mut room());
+    let (deeper, _) = direct_of(&of_depth_2, &mut room());
+    let (whole, all) = direct_of(&paths(32, 16), &mut room());
+    assert!(apart(&whole, &[&direct]) < 1e-12 && apart(&whole, &[&deeper]) < 1e-12);
+    assert!(sum(&direct) < 0.999 * sum(&picture), "paths of depth 1 find light of two reflections");
+    assert!(sum(&whole) < 0.95 * sum(&all));
 }
 
 #[test]

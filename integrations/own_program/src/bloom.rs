@@ -57,7 +57,7 @@ impl Effect for BloomEffect {
         self.bloom.is_some()
     }
 
-    fn is_still(&mut self, world: &mut World) -> bool {
+    fn is_unchanged(&mut self, world: &mut World) -> bool {
         found(world) == self.bloom
     }
 
@@ -120,7 +120,7 @@ impl BloomEffect {
         pipeline: impl Fn(&OnDevice) -> &wgpu::RenderPipeline + 'a,
     ) {
         let mut pass =
-            graph.raster_pass(name).calls_for(self.bloom.is_some(), "camera with bloom").samples(&fine);
+            graph.raster_pass(name).requires(self.bloom.is_some(), "camera with bloom").samples(&fine);
         if coarse != fine {
             pass = pass.samples(&coarse);
         }

@@ -78,7 +78,7 @@ impl Effect for OutlineEffect {
         !self.outlined.is_empty()
     }
 
-    fn is_still(&mut self, world: &mut World) -> bool {
+    fn is_unchanged(&mut self, world: &mut World) -> bool {
         found(world) == self.outlined
     }
 
@@ -109,7 +109,7 @@ impl Effect for OutlineEffect {
         let mut shapes = board.texture(graph, "outlined shapes", SHAPES);
         graph
             .raster_pass("outlined shapes")
-            .calls_for(there, "outlined object")
+            .requires(there, "outlined object")
             .color(&mut shapes, LoadOp::Clear(wgpu::Color::TRANSPARENT))
             .run(move |context| {
                 let Some(device) = &self.device else { return Ok(()) };
@@ -134,7 +134,7 @@ impl Effect for OutlineEffect {
             });
         graph
             .raster_pass("outline")
-            .calls_for(there, "outlined object")
+            .requires(there, "outlined object")
             .samples(&shapes)
             .color(&mut board.target, LoadOp::Load)
             .run(move |context| {

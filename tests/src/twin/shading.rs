@@ -127,15 +127,15 @@ impl<'a> ShadedTriangle<'a> {
         let side = self.object.material.surface(front);
         let mut surface = SurfaceSample::new(&self.object.material, front);
         if widening > 0.0 {
-            let energy_keeping = surface.lobe == Lobe::EnergyKeeping;
-            let of_half_vector = energy_keeping
+            let energy_conserving = surface.lobe == Lobe::EnergyConserving;
+            let of_half_vector = energy_conserving
                 || matches!(
                     self.object.reflection,
                     ReflectionModel::Blinn | ReflectionModel::TorranceSparrow
                 );
             let lobe = filtered_lobe(surface.shininess, if of_half_vector { 1.0 } else { 4.0 }, widening);
             surface.shininess = lobe.shininess;
-            surface.peak = if energy_keeping { 1.0 } else { lobe.peak };
+            surface.peak = if energy_conserving { 1.0 } else { lobe.peak };
         }
         let viewer = viewer_direction(scene.settings.local_viewer, scene.eye, scene.basis.z_axis, point);
         let mapped = self.object.lightmap.is_some();

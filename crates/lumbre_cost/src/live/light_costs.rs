@@ -1,4 +1,5 @@
-//! What the lights of a view cost and give: frames with each of them, or each group, switched off in turn. Measured, not divided by a model.
+//! Measures what the lights of a view cost and contribute, by drawing frames with each light, or each group
+//! of lights, switched off in turn. The cost is measured and not derived from a model.
 
 use bevy_ecs::prelude::*;
 use glam::DVec3;
@@ -10,31 +11,32 @@ use lumbre_trace::relative_error;
 use super::side_view::SideView;
 use crate::Spread;
 
-/// Lights that are measured one by one; more are measured in groups.
-const MOST_ALONE: usize = 8;
-/// In each, every frame is drawn once.
+/// Largest number of lights that are measured one by one; more lights are measured in groups.
+const MAX_SINGLE_LIGHTS: usize = 8;
+/// Number of rounds; in each of them every frame is drawn once.
 const ROUNDS: usize = 5;
 
-/// What a light, or a group of them, costs and gives.
+/// Cost and contribution of a light or a group of lights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightCost {
-    /// Its name, or what the group has in common.
+    /// Name of the light or the group.
     pub name: String,
-    /// How many lights they are.
+    /// Number of lights.
     pub lights: usize,
-    /// Milliseconds that a frame takes longer with it, round by round; below zero where it is slower without.
+    /// Milliseconds that a frame takes longer with it, over pairs from the same round; negative if frames are
+    /// slower without it.
     pub milliseconds: Spread,
     /// Relative RMSE of the picture without it against the picture with it.
     pub difference: f64,
 }
 
-/// Measures what lights cost, a frame at a time.
+/// Measures what lights cost, one frame per step.
 pub struct LightCosts {
     groups: Vec<Group>,
-    /// The picture of each group's absence against the whole.
+    /// The difference of the picture without each group from the whole picture.
     differences: Vec<f64>,
     whole: Vec<DVec3>,
-    /// By group the times without it; last, those of all lights.
+    /// The times without each group, and last those with all lights.
     times: Vec<Vec<f64>>,
     drawn: usize,
 }
@@ -44,12 +46,12 @@ pub struct LightCosts {
 struct Group {
     name: String,
     lights: Vec<Entity>,
-    /// Surfaces that glow as polygon lights.
+    /// Emissive surfaces that are polygon lights.
     glowing: Vec<Entity>,
 }
 
 impl LightCosts {
-    /// Begins: draws the view with all its lights.
+    /// Begins a measurement by drawing the view with all its lights.
     ///
     /// # Errors
     /// As drawing a frame.
@@ -64,7 +66,7 @@ impl LightCosts {
         Ok(Self { groups, differences: Vec::new(), whole, times, drawn: 0 })
     }
 
-    /// How much of it is done, 0 to 1.
+    /// Returns the fraction that is done.
     pub fn fraction(&self) -> f64 {
         self.drawn as f64 / self.frames().max(1) as f64
     }
@@ -73,7 +75,8 @@ impl LightCosts {
         self.groups.len() + ROUNDS * self.times.len()
     }
 
-    /// Draws the next frame; what all of them cost when that was the last one, the dearest first. The World and the options are those that it began with.
+    /// Draws the next frame. After the last one it returns the costs, the highest first. World and options
+    /// must be the same in all steps.
     ///
     /// # Errors
     /// As drawing a frame.
@@ -120,7 +123,7 @@ impl LightCosts {
 }
 
 impl Group {
-    /// Draws without it, and switches it on again.
+    /// Draws with the group switched off, and switches it on again.
     fn left_out<T>(&self, world: &mut World, draw: impl FnOnce(&mut World) -> T) -> T {
         self.switch(world, false);
         let drawn = draw(world);
@@ -143,7 +146,8 @@ impl Group {
     }
 }
 
-/// The lights that shine: each for itself if they are few, else by their kind and whether they cast shadows; and all surfaces that glow as lights.
+/// Returns the groups of lights that shine: single lights if there are few, and otherwise lights of the same
+/// kind that cast or do not cast shadows; and all emissive surfaces that are lights.
 fn groups(world: &mut World) -> Vec<Group> {
     let mut lights = world.query::<(Entity, &Light, Option<&GlobalTransform>, Option<&Name>)>();
     let shining: Vec<(Entity, &Light, Option<&Name>)> = lights
@@ -151,7 +155,7 @@ fn groups(world: &mut World) -> Vec<Group> {
         .filter(|(_, light, place, _)| shines(light, *place))
         .map(|(entity, light, _, name)| (entity, light, name))
         .collect();
-    let alone = shining.len() <= MOST_ALONE;
+    let alone = shining.len() <= MAX_SINGLE_LIGHTS;
     let mut groups: Vec<Group> = Vec::new();
     for (entity, light, name) in shining {
         let kind = kind(light);
@@ -173,7 +177,7 @@ fn groups(world: &mut World) -> Vec<Group> {
     groups
 }
 
-/// In words.
+/// Returns the kind of a light in words.
 fn kind(light: &Light) -> &'static str {
     let has_cone = light.spot.is_some_and(|cone| !cone.is_everywhere());
     match light.kind {

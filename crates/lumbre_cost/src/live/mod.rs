@@ -1,7 +1,9 @@
-//! What the view that somebody is looking at costs and lacks, measured a frame at a time between the frames of a window: its error against the most accurate way to draw it,
-//! what its lights cost, and the front of settings for it. Not the window, and not `tune`, which measures a file at all of its cameras.
+//! Measures the view that a window shows, one frame at a time between the window's own frames: its error
+//! against the most accurate way to draw it, what its lights cost, and the Pareto front of settings. `tune`
+//! measures a file at all of its cameras instead.
 //!
-//! A measured frame is drawn from the World of the window, by renderers of its own. What it changes of the World it gives back before it returns.
+//! Measured frames are drawn from the window's World by renderers of their own. Changes to the World are
+//! undone before a call returns.
 
 mod light_costs;
 mod reference;

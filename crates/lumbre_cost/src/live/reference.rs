@@ -1,4 +1,5 @@
-//! The view beside its reference, now and then: both are drawn between frames of the window, and compared on a thread of their own. Not what shows it.
+//! Compares the view with its reference from time to time: both are drawn between frames of the window, and
+//! compared on a thread of their own.
 
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
@@ -14,25 +15,25 @@ use crate::picture::{Picture, compared_at};
 use crate::tune::{Choices, DrawSettings};
 use crate::{ErrorOf, ErrorOver};
 
-/// Of the time, what drawing and comparing the two may take at most: one part in so many.
+/// Drawing and comparing may take at most one part in this many of the time.
 const SHARE: u32 = 4;
-/// Between two of them, at least.
-const LEAST_PAUSE: Duration = Duration::from_millis(500);
+/// Shortest pause between two comparisons.
+const MIN_PAUSE: Duration = Duration::from_millis(500);
 
-/// A reference that was drawn, and how far the frame was from it.
+/// A reference picture, and the difference of a frame from it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Beside {
     /// Width and height in pixels.
     pub size: (u32, u32),
-    /// The reference as it is shown: red, green, blue, alpha, top row first.
+    /// The reference as displayed: red, green, blue, alpha, top row first.
     pub rgba: Vec<u8>,
-    /// How far the frame was from it.
+    /// The difference of the frame from it.
     pub error: ErrorOf,
-    /// The settings of that frame.
+    /// The settings of the frame.
     pub settings: DrawSettings,
 }
 
-/// Draws references now and then.
+/// Draws references from time to time.
 #[derive(Default)]
 pub struct BesideReference {
     compared: Option<(Instant, Receiver<Option<Beside>>)>,
@@ -40,13 +41,14 @@ pub struct BesideReference {
 }
 
 impl BesideReference {
-    /// Has the next one drawn at once.
+    /// Makes the next call of [`update`](Self::update) draw a reference, whatever the time.
     pub fn hurry(&mut self) {
         self.due = None;
     }
 
-    /// Draws the frame of these options and its reference if it is time for that, and hands out what was compared since the last call. A World without a camera that
-    /// sees anything is for the caller to find out.
+    /// Draws the frame with these options and its reference, if it is time for it, and returns a comparison
+    /// that has been completed since the last call. The caller must ensure that the World has a camera that
+    /// sees something.
     ///
     /// # Errors
     /// As drawing a frame.
@@ -69,10 +71,10 @@ impl BesideReference {
         let (sender, receiver) = channel();
         let compare = move || {
             let found = beside(size, settings, [&reference, &frame], f64::from(exposure));
-            // Nobody waits for it any more if the window is gone.
+            // The receiver is gone if the window was closed.
             let _ = sender.send(found);
         };
-        // Without a thread there is no comparison this time.
+        // If no thread can be started, there is no comparison this time.
         if thread::Builder::new().name("compare".to_owned()).spawn(compare).is_ok() {
             self.compared = Some((begun, receiver));
         }
@@ -86,13 +88,13 @@ impl BesideReference {
             Ok(found) => found,
             Err(TryRecvError::Disconnected) => None,
         };
-        self.due = Some(Instant::now() + LEAST_PAUSE.max(begun.elapsed() * (SHARE - 1)));
+        self.due = Some(Instant::now() + MIN_PAUSE.max(begun.elapsed() * (SHARE - 1)));
         self.compared = None;
         found
     }
 }
 
-/// The factor on radiance of the camera that a frame is drawn from.
+/// Returns the exposure factor of the camera that a frame is drawn from.
 fn exposure_of(world: &mut World, options: &FrameOptions) -> f32 {
     let asked = options.camera.and_then(|camera| world.get::<Camera>(camera).copied());
     let mut active = world.query_filtered::<&Camera, With<ActiveCamera>>();

@@ -1,4 +1,5 @@
-//! Frames beside those of a window: drawn into memory by renderers of their own, for their time or for their light. Not what they are drawn for.
+//! Draws frames into memory beside those of a window, with renderers of its own, for their times or their
+//! radiance.
 
 use std::time::Instant;
 
@@ -10,17 +11,17 @@ use lumbre_render::{
 
 use crate::rounds::milliseconds_since;
 
-/// Draws frames of one size on a device, beside those that are shown.
+/// Draws frames of one size beside those of a window.
 pub struct SideView {
     gpu: Gpu,
     size: (u32, u32),
-    /// Draws what is timed; the other one, what is looked at: their formats differ, and with them their pipelines.
+    /// Renderers for timed frames and for pictures. Their formats differ, and therefore their pipelines.
     timed: (Renderer, Offscreen),
     looked_at: (Renderer, Offscreen),
 }
 
 impl SideView {
-    /// For pictures of `size` pixels.
+    /// Creates it for pictures of `size` pixels.
     ///
     /// # Errors
     /// [`RenderError::TargetTooLarge`], also for a size of 0.
@@ -36,13 +37,14 @@ impl SideView {
         })
     }
 
-    /// Width and height of its pictures in pixels.
+    /// Returns width and height of its pictures in pixels.
     pub fn size(&self) -> (u32, u32) {
         self.size
     }
 
-    /// Milliseconds of a frame, from the call until the device has finished. It is drawn twice, and the second one is timed: in the first the renderer reads
-    /// what has changed since it drew something else, and whatever the window had begun on the device is finished.
+    /// Returns the milliseconds of a frame, from the call until the device has finished. The frame is drawn
+    /// twice and the second drawing is timed: during the first, the renderer reads what has changed since it
+    /// drew something else, and the device finishes the work of the window.
     ///
     /// # Errors
     /// As drawing a frame.
@@ -63,7 +65,7 @@ impl SideView {
         drawn()
     }
 
-    /// The light of a frame: linear RGB without exposure, W/(m² sr), top row first.
+    /// Returns the radiance of a frame: linear RGB without exposure, W/(m² sr), top row first.
     ///
     /// # Errors
     /// As drawing a frame.

@@ -1,15 +1,16 @@
-//! The ways to draw a view that no other one beats, and how one gets from one to the next: by a time, by an error, or a step at a time. Not their measuring.
+//! The Pareto front of the ways to draw a view, and how to choose from it: by a time, by an error, or the
+//! next step in either direction.
 
 use crate::tune::{DrawSettings, choose};
 use crate::{ErrorOf, Goal, Point, Spread};
 
-/// Smaller differences of errors are rounding of 32-bit floats, and no gain.
+/// Smaller differences of errors are rounding errors of 32-bit floats.
 const ROUNDING: f64 = 1e-6;
 
-/// A way to draw a view, with its two prices.
+/// A way to draw a view, with its time and its error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Priced {
-    /// What it is called.
+    /// Its name.
     pub label: String,
     /// The settings.
     pub settings: DrawSettings,
@@ -19,33 +20,34 @@ pub struct Priced {
     pub error: f64,
 }
 
-/// What was measured of a view.
+/// The measurements of a view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewFront {
     /// The ways that no other one beats, from the cheapest to the most accurate; at least one.
     pub ways: Vec<Priced>,
-    /// How it was drawn when it was measured.
+    /// The way in which it was drawn when the measurement began.
     pub now: Priced,
 }
 
 impl ViewFront {
-    /// The way with the least error within a time, and the cheapest of those that look alike; the cheapest of all where none is quick enough.
+    /// Returns the way with the least error within a time, and the cheapest of those that look alike; the
+    /// cheapest of all if none is fast enough.
     pub fn within_milliseconds(&self, most: f64) -> usize {
         self.best(Goal { milliseconds: Some(most), error: None }).unwrap_or(0)
     }
 
-    /// The cheapest way within an error; the most accurate of all where none is near enough.
+    /// Returns the cheapest way within an error; the most accurate of all if none is accurate enough.
     pub fn within_error(&self, most: f64) -> usize {
         self.best(Goal { milliseconds: None, error: Some(most) }).unwrap_or(self.ways.len().saturating_sub(1))
     }
 
-    /// The most accurate way that takes less time than this one, quartiles and all.
+    /// Returns the most accurate way that takes less time than this one, with quartiles that do not overlap.
     pub fn next_cheaper(&self, than: &Priced) -> Option<usize> {
         let cheaper = |way: &Priced| way.milliseconds.is_below(&than.milliseconds);
         self.ways.iter().rposition(cheaper)
     }
 
-    /// The cheapest way whose error is smaller than this one's.
+    /// Returns the cheapest way whose error is smaller than that of this one.
     pub fn next_better(&self, than: &Priced) -> Option<usize> {
         self.ways.iter().position(|way| way.error < than.error - ROUNDING)
     }
@@ -91,14 +93,15 @@ mod tests {
         let front = ViewFront { ways, now: way(30.0, 0.05) };
         assert_eq!([4.0, 5.0, 12.0, 20.0, 1e3].map(|ms| front.within_milliseconds(ms)), [0, 0, 1, 2, 3]);
         assert_eq!([1.0, 0.4, 0.3, 0.01, 1e-9].map(|error| front.within_error(error)), [0, 0, 1, 2, 3]);
-        // As accurate as now for a third of the time, and better for less: both are steps forward.
+        // One way is as accurate as now in a third of the time, another one is better in less time: both are
+        // steps forward.
         assert_eq!((front.next_cheaper(&front.now), front.next_better(&front.now)), (Some(2), Some(2)));
         assert_eq!(
             (front.next_cheaper(&front.ways[1]), front.next_better(&front.ways[1])),
             (Some(0), Some(2))
         );
         assert_eq!((front.next_cheaper(&front.ways[0]), front.next_better(&front.ways[3])), (None, None));
-        // Within the quartiles nothing is cheaper.
+        // Nothing is cheaper if the quartiles overlap.
         assert_eq!(front.next_cheaper(&way(5.1, 0.4)), None);
     }
 }

@@ -1,5 +1,5 @@
-//! Measures the front of settings for a view, a frame at a time: the same stages as `tune`, at one camera, with the World as it stands. Nothing may move meanwhile: all
-//! errors are against one picture.
+//! Measures the Pareto front of settings for a view, one frame per step, in the same stages as `tune`.
+//! Nothing in the World may move meanwhile, as all errors are measured against one picture.
 
 use bevy_ecs::world::World;
 use glam::DVec3;
@@ -11,28 +11,30 @@ use super::view_front::{Priced, ViewFront};
 use crate::tune::{Candidates, Choices, DrawSettings, Stage};
 use crate::{ErrorOf, Point, Spread, pareto_front};
 
-/// Rounds of a stage, and of what is left in the end. In each every way is drawn once.
+/// Number of rounds in a stage, and in the final measurement of what is left. Each round draws every way
+/// once.
 const ROUNDS: [usize; 2] = [3, 7];
 
-/// A walk through the settings of a view. Each step draws one frame.
+/// A measurement of the settings for a view. Each step draws one frame.
 pub struct ViewWalk {
     choices: Choices,
     found: Candidates,
     reference: Vec<DVec3>,
-    /// How it was drawn when the walk began: error against the reference, and the times of the last rounds.
+    /// The way in which the view was drawn when the measurement began, its error against the reference, and
+    /// its times in the final rounds.
     now: (DrawSettings, f64, Vec<f64>),
-    /// Stages that are still to be begun, the next one last.
+    /// The stages that have not begun yet; the next one is last.
     ahead: Vec<Stage>,
     under_way: Leg,
 }
 
-/// Ways that are measured side by side.
+/// Ways that are measured in the same rounds.
 #[derive(Default)]
 struct Leg {
     ways: Vec<DrawSettings>,
-    /// Whether these are the last rounds.
+    /// Whether these are the final rounds.
     is_last: bool,
-    /// Errors of those that were new.
+    /// Errors of the ways that are new.
     errors: Vec<Option<f64>>,
     times: Vec<Vec<f64>>,
     drawn: usize,
@@ -43,7 +45,8 @@ impl Leg {
         ROUNDS[usize::from(self.is_last)]
     }
 
-    /// Frames that it takes: a picture of each way, and each once a round; in the last rounds the view as it is, too.
+    /// Returns the number of frames: a picture of each way, and every way once per round. The final rounds
+    /// include the view as it is.
     fn frames(&self) -> usize {
         let timed = self.ways.len() + usize::from(self.is_last);
         self.ways.len() + self.rounds() * timed
@@ -51,7 +54,8 @@ impl Leg {
 }
 
 impl ViewWalk {
-    /// Begins: draws the view as it is, and by the most accurate way. `exposure` is what the window shows it with, if it is not the camera's.
+    /// Begins a measurement by drawing the view as it is, and in the most accurate way. `exposure` is that of
+    /// the window, if it is not the camera's.
     ///
     /// # Errors
     /// As drawing a frame.
@@ -75,7 +79,8 @@ impl ViewWalk {
         Ok(walk)
     }
 
-    /// How much of it is done, 0 to 1, as far as that is known: what a stage finds decides how much there is in the next.
+    /// Returns the fraction that is done. It is an estimate, since the result of a stage determines how much
+    /// there is to do in the next.
     pub fn fraction(&self) -> f64 {
         let legs = (Stage::ALL.len() + 1) as f64;
         let ahead = if self.under_way.is_last { 0.0 } else { (self.ahead.len() + 1) as f64 };
@@ -83,7 +88,8 @@ impl ViewWalk {
         ((legs - ahead - 1.0 + part) / legs).clamp(0.0, 1.0)
     }
 
-    /// Draws the next frame; the front when that was the last one. The World and the options are those that it began with.
+    /// Draws the next frame. After the last one it returns the front. World and options must be the same in
+    /// all steps.
     ///
     /// # Errors
     /// As drawing a frame.
@@ -109,7 +115,7 @@ impl ViewWalk {
         } else {
             let timed = ways + usize::from(leg.is_last);
             let (round, place) = ((drawn - ways) / timed, (drawn - ways) % timed);
-            // Every other round goes backwards, so that none always follows the same one.
+            // The order is reversed in every other round, so that no way always follows the same one.
             let place = if round % 2 == 0 { place } else { timed - 1 - place };
             match leg.ways.get(place) {
                 Some(way) => {
@@ -132,7 +138,7 @@ impl ViewWalk {
         Ok(None)
     }
 
-    /// Begins the next leg: that of the next stage in which there is something to choose, or the last rounds.
+    /// Begins the next stage in which there is something to choose, or the final rounds.
     fn set_out(&mut self) {
         while let Some(stage) = self.ahead.pop() {
             let ways = self.found.next(stage, &self.choices);
@@ -153,7 +159,7 @@ impl ViewWalk {
         self.under_way = Leg { ways, is_last, times, ..Leg::default() };
     }
 
-    /// Takes what the leg has found.
+    /// Takes the results of a stage.
     fn arrive(&mut self) {
         let leg = &self.under_way;
         self.found.begin();
@@ -166,7 +172,7 @@ impl ViewWalk {
         }
     }
 
-    /// What no other way beats, by the last rounds.
+    /// Returns the ways that no other one beats in the final rounds.
     fn front(&self) -> Option<ViewFront> {
         let latest: Vec<(DrawSettings, Point)> = self
             .found
@@ -197,7 +203,7 @@ impl ViewWalk {
     }
 }
 
-/// Without alpha, in f64.
+/// Returns the colours without alpha, in f64.
 fn radiance(picture: &[glam::Vec4]) -> Vec<DVec3> {
     picture.iter().map(|pixel| pixel.truncate().as_dvec3()).collect()
 }

@@ -1,4 +1,5 @@
-//! The page's pictures: one large, with a slider between it and its reference or its heat map, and all of them small to choose from.
+//! The picture viewer of the page: a large picture with a slider between it and its reference or its heat
+//! map, and thumbnails of all pictures.
 
 use maud::{Markup, html};
 
@@ -6,7 +7,7 @@ use super::Images;
 use crate::findings::cost_of;
 use crate::{Point, PointPicture, Study};
 
-/// The viewer of a study; nothing for a study without pictures.
+/// Returns the viewer of a study; empty for a study without pictures.
 pub fn viewer(study: &Study, images: &Images<'_>) -> Markup {
     let shown: Vec<Shown<'_>> =
         study.points.iter().enumerate().filter_map(|point| Shown::of(point, images)).collect();
@@ -32,11 +33,11 @@ pub fn viewer(study: &Study, images: &Images<'_>) -> Markup {
             figure {
                 div class="pair" {
                     img class="picture" src=(first.picture) alt=(format!("The picture of {}", first.title));
-                    img class="other" src=(reference) alt="The reference, or where the picture differs from it";
+                    img class="other" src=(reference) alt="The reference, or a map of the differences from it";
                 }
                 label class="slider" {
                     span { "picture" }
-                    input type="range" min="0" max="100" value="50" aria-label="Where the picture ends and what it is compared with begins";
+                    input type="range" min="0" max="100" value="50" aria-label="Position of the boundary between the picture and what it is compared with";
                     span { "compared with" }
                 }
                 div class="choice" role="group" aria-label="What the picture is compared with" {
@@ -66,7 +67,7 @@ pub fn viewer(study: &Study, images: &Images<'_>) -> Markup {
 
 /// A point's picture, ready for the page.
 struct Shown<'a> {
-    /// The point's place in its study.
+    /// Index of the point in its study.
     number: usize,
     files: &'a PointPicture,
     title: String,
@@ -89,10 +90,10 @@ impl<'a> Shown<'a> {
     }
 }
 
-/// What every JPEG begins with.
+/// The first bytes of every JPEG file.
 const JPEG: &[u8] = &[0xff, 0xd8];
 
-/// A picture within the page: a JPEG, or a PNG.
+/// Returns a picture, a JPEG or a PNG, as a data URI.
 fn inline(picture: &[u8]) -> String {
     let kind = if picture.starts_with(JPEG) { "jpeg" } else { "png" };
     format!("data:image/{kind};base64,{}", base64::encode(picture))

@@ -1,4 +1,4 @@
-//! The report as one page of HTML that needs nothing else: plots, pictures and style are in it. Not the numbers.
+//! The report as a single HTML page that contains its plots, pictures and styles.
 
 mod gallery;
 mod tables;
@@ -8,13 +8,14 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use crate::plot::{PlotSize, SERIES_COLORS, draw_plot, drawn_series};
 use crate::{CostError, CostReport, Plot, Study};
 
-/// The bytes of a PNG or JPEG by the name that a point has for its picture; nothing where it is not there.
+/// Returns the bytes of a PNG or JPEG by the name with which a point refers to its picture; `None` if it does
+/// not exist.
 pub type Images<'a> = dyn Fn(&str) -> Option<Vec<u8>> + 'a;
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// The whole page.
+/// Returns the whole page.
 ///
 /// # Errors
 /// [`CostError::Plot`].
@@ -37,13 +38,13 @@ pub fn page(report: &CostReport, images: &Images<'_>) -> Result<String, CostErro
                 header {
                     h1 { "What accuracy costs in time" }
                     p {
-                        "Every choice has two prices: milliseconds, and how far the result is from a named reference. Times are medians over rounds in which all choices of a study take turns, with their quartiles as lines; errors are relative root mean squares. A point of a plot that is pointed at or tapped says what it is, and shows its picture. "
-                        "Measured on this machine, at these settings:"
+                        "Every choice has a time in milliseconds and an error, which is the difference of its result from a reference. Times are medians over rounds in which all choices of a study take turns, with quartiles drawn as lines. Errors are relative root mean square errors. Point at or tap a point of a plot to see what it is, with its picture. "
+                        "Measured on this machine, with these settings:"
                     }
                     (tables::conditions(report))
                 }
                 nav aria-label="Studies" {
-                    h2 { "What was found" }
+                    h2 { "Findings" }
                     ol {
                         @for study in &report.studies {
                             li {
@@ -55,7 +56,7 @@ pub fn page(report: &CostReport, images: &Images<'_>) -> Result<String, CostErro
                 }
                 main { @for section in &sections { (section) } }
                 footer {
-                    p { "The same numbers stand in " code { "cost.json" } " and " code { "cost.csv" } ", pictures of light in " code { "pictures" } ". Commands are meant to be run in the folder of this page." }
+                    p { "The same numbers are in " code { "cost.json" } " and " code { "cost.csv" } ", and pictures with their radiance in " code { "pictures" } ". Commands are to be run in the folder of this page." }
                 }
                 script { (PreEscaped(SCRIPT)) }
             }
@@ -67,7 +68,7 @@ pub fn page(report: &CostReport, images: &Images<'_>) -> Result<String, CostErro
 fn section(study: &Study, images: &Images<'_>) -> Result<Markup, CostError> {
     let mut plots = Vec::new();
     for plot in &study.plots {
-        // A plot without a point is one whose quantities no file called for.
+        // A plot has no points if no file called for its quantities.
         if !drawn_series(study, plot).is_empty() {
             plots.push(plot_figure(study, plot)?);
         }
@@ -76,7 +77,7 @@ fn section(study: &Study, images: &Images<'_>) -> Result<Markup, CostError> {
         section id=(study.name) {
             h2 { (study.title) }
             p { (study.question) }
-            p class="reference" { "Errors are against " (study.reference) "." }
+            p class="reference" { "Reference for errors: " (study.reference) "." }
             @if !study.findings.is_empty() {
                 ul class="findings" { @for finding in &study.findings { li { (finding) } } }
             }
@@ -111,7 +112,7 @@ fn plot_figure(study: &Study, plot: &Plot) -> Result<Markup, CostError> {
                     li { (legend_mark(place)) (series) }
                 }
                 @if plot.front {
-                    li { span class="front" {} "not beaten in both" }
+                    li { span class="front" {} "not beaten in both quantities" }
                 }
                 @if plot.equal {
                     li { span class="front" {} "equal" }
@@ -121,7 +122,7 @@ fn plot_figure(study: &Study, plot: &Plot) -> Result<Markup, CostError> {
     })
 }
 
-/// The mark that a plot has for a series.
+/// Returns the mark of a series for the legend.
 fn legend_mark(series: usize) -> Markup {
     let color = format!("var(--series-{})", series % SERIES_COLORS);
     html! {

@@ -1,4 +1,4 @@
-// The slider between a picture and what it is compared with. Without scripts the first picture of each study stands beside its reference.
+// The slider between a picture and what it is compared with. Without scripts, the first picture of each study is shown with its reference.
 for (const viewer of document.querySelectorAll(".viewer")) {
   const pair = viewer.querySelector(".pair");
   const [picture, other] = pair.querySelectorAll("img");
@@ -27,7 +27,7 @@ for (const viewer of document.querySelectorAll(".viewer")) {
   slider.addEventListener("input", () => pair.style.setProperty("--at", `${slider.value}%`));
 }
 
-// Points of plots: pointed at, tapped or reached by the keyboard they say what they are; chosen, they show their picture in the viewer.
+// Points of plots show their details when they are pointed at, tapped or focused, and their picture in the viewer when they are chosen.
 for (const figure of document.querySelectorAll(".plot")) {
   const tip = figure.querySelector(".tip");
   const [image] = tip.getElementsByTagName("img"), [text] = tip.getElementsByTagName("p");
@@ -39,7 +39,7 @@ for (const figure of document.querySelectorAll(".plot")) {
     if (picture) image.src = picture.src;
     text.textContent = hit.dataset.details;
     tip.hidden = false;
-    // Beside the point, within the figure.
+    // Place the details beside the point, within the figure.
     const frame = figure.getBoundingClientRect(), mark = hit.getBoundingClientRect();
     const left = mark.right - frame.left + 4, room = frame.width - tip.offsetWidth;
     const beside = left <= room ? left : mark.left - frame.left - tip.offsetWidth - 4;

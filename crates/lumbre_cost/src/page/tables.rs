@@ -1,4 +1,4 @@
-//! The page's tables: what was measured on, and every point with its numbers.
+//! The tables of the page: the conditions of the measurement, and all points with their numbers.
 
 use std::collections::BTreeSet;
 
@@ -7,15 +7,15 @@ use maud::{Markup, html};
 use crate::findings::{counted, milliseconds, rounded};
 use crate::{CostReport, Point, Study};
 
-/// The machine and the settings.
+/// Returns the list of machine and settings.
 pub fn conditions(report: &CostReport) -> Markup {
     let (machine, settings) = (&report.machine, &report.settings);
     let (width, height) = settings.size;
     let effort = match (settings.quick, settings.counts_only) {
-        (true, true) => "quick: fewer points; counts alone",
+        (true, true) => "quick: fewer points; only counts",
         (true, false) => "quick: fewer points and rounds",
-        (false, true) => "counts alone",
-        (false, false) => "whole",
+        (false, true) => "only counts",
+        (false, false) => "full",
     };
     let rows = [
         ("Processor", format!("{}, {} threads", machine.processor, machine.threads)),
@@ -36,7 +36,7 @@ pub fn conditions(report: &CostReport) -> Markup {
     }
 }
 
-/// Every point with its numbers, and the commands that make them again.
+/// Returns the table of all points, and the commands that reproduce them.
 pub fn points(study: &Study) -> Markup {
     let names =
         |of: fn(&Point) -> Vec<&String>| -> BTreeSet<&String> { study.points.iter().flat_map(of).collect() };
@@ -57,7 +57,7 @@ pub fn points(study: &Study) -> Markup {
                 thead {
                     tr {
                         th scope="col" { "choice" }
-                        th scope="col" { "of" }
+                        th scope="col" { "setting" }
                         th scope="col" { "time" }
                         th scope="col" { "RMSE, %" }
                         @if has_flip { th scope="col" { "FLIP" } }
@@ -83,7 +83,7 @@ pub fn points(study: &Study) -> Markup {
             }
         }
         details class="commands" {
-            summary { "The commands that make these points again" }
+            summary { "Commands that reproduce these points" }
             dl {
                 @for point in &study.points {
                     dt { (point.series) ", " (point.label) }

@@ -1,4 +1,5 @@
-//! Balls of few and many triangles, near and far, matt and glossy, on a floor: some want Phong shading and some do not, which is what shading by need decides.
+//! Balls of few and many triangles, near and far, matt and glossy, on a floor. Some of them need Phong
+//! shading and some do not, which is what shading by need decides.
 
 use std::sync::Arc;
 
@@ -8,13 +9,13 @@ use lumbre_mesh::shapes::{plane, tetrahedral_sphere};
 use lumbre_optics::{Light, Material, Surface};
 use lumbre_scene::{Camera, Mesh, Name, Projection, SceneSettings, Transform};
 
-/// Subdivisions of the balls of a row, from left to right: 256 to 4,096 triangles.
+/// Subdivision depths of the balls in a row, from left to right: 256 to 4,096 triangles.
 const DEPTHS: std::ops::RangeInclusive<u32> = 3..=5;
-/// Rows by what they are called, the height and depth of their middle in metres, and the distance from ball to ball.
+/// Name, height and depth of the centre of each row in metres, and the distance between its balls.
 const ROWS: [(&str, f64, f64, f64); 2] = [("near", 0.5, 0.0, 1.1), ("far", 3.0, -9.0, 1.5)];
 const RADIUS: f32 = 0.45;
 
-/// The balls, under a sun and a weaker light from the other side.
+/// Creates the balls under a sun and a weaker light from the other side.
 pub fn assorted_balls() -> World {
     let mut world = World::new();
     world.insert_resource(SceneSettings { ambient: Vec3::splat(0.08), ..SceneSettings::default() });

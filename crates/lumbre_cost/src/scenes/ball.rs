@@ -1,4 +1,5 @@
-//! A ball before black, under one distant light: the documents' example of what flat and Gouraud shading lose.
+//! A ball in front of black under one distant light: the documents' example of what flat and Gouraud shading
+//! lose.
 
 use std::sync::Arc;
 
@@ -8,23 +9,23 @@ use lumbre_mesh::shapes::tetrahedral_sphere;
 use lumbre_optics::{Light, Lobe, Material, ReflectionModel, Surface};
 use lumbre_scene::{Camera, Mesh, Name, Projection, Quadric, SceneSettings, Transform};
 
-/// What is varied about the ball.
+/// The parameters of the ball.
 #[derive(Clone, Copy, Debug)]
 pub struct Ball {
-    /// How often the tetrahedron that it begins as is subdivided: 4^(depth + 1) triangles.
+    /// Number of subdivisions of the initial tetrahedron; the ball has 4^(depth + 1) triangles.
     pub depth: u32,
-    /// The exponent of its highlight.
+    /// Exponent of its highlight.
     pub shininess: f32,
-    /// The model of its highlight.
+    /// Reflection model of its highlight.
     pub reflection: ReflectionModel,
-    /// What its highlight's brightness means.
+    /// How its specular coefficient is interpreted.
     pub lobe: Lobe,
 }
 
-/// Of the camera, in radians: the ball of radius 1 fills the frame but for a rim.
+/// Field of view in radians with which the ball of radius 1 fills the frame except for a rim.
 const VERTICAL_FOV: f64 = 0.56;
 
-/// The ball as triangles with the normals of the sphere.
+/// Creates the ball as triangles with the normals of the sphere.
 pub fn ball(ball: Ball) -> World {
     let mut world = surroundings(ball);
     let mesh = Mesh(Arc::new(tetrahedral_sphere(1.0, ball.depth, false)));
@@ -32,7 +33,7 @@ pub fn ball(ball: Ball) -> World {
     world
 }
 
-/// The ball as the exact sphere, for rays; a rasterizer draws an octahedron-like stand-in.
+/// Creates the ball as an exact sphere for rays. A rasterizer draws a coarse mesh instead.
 pub fn exact_ball(ball: Ball) -> World {
     let mut world = surroundings(ball);
     let mesh = Mesh(Arc::new(tetrahedral_sphere(1.0, 2, false)));
@@ -54,7 +55,7 @@ fn material(ball: Ball) -> Material {
 
 fn surroundings(ball: Ball) -> World {
     let mut world = World::new();
-    // All of the ball is lit, so that it is told from the background.
+    // All of the ball is lit, so that it can be distinguished from the background.
     world.insert_resource(SceneSettings {
         ambient: Vec3::splat(0.15),
         reflection: ball.reflection,

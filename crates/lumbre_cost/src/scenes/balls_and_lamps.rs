@@ -8,24 +8,24 @@ use lumbre_mesh::shapes;
 use lumbre_optics::{Light, Material};
 use lumbre_scene::{Camera, Mesh, Name, Projection, Transform};
 
-/// What is varied about them.
+/// The parameters of the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct BallsAndLamps {
-    /// How many lamps.
+    /// Number of lamps.
     pub lamps: u32,
-    /// Radiance of a white surface, facing a lamp, below which the lamp is left out: it ends at the distance where it brings so much. 0 for
-    /// lamps without an end.
+    /// A lamp ends where it gives a white surface that faces it this radiance. 0 for lamps that do not end.
     pub threshold: f32,
-    /// Of the lamps' places and colours.
+    /// Seed of the lamps' positions and colours.
     pub seed: u32,
 }
 
 /// Half the side of the floor, in metres.
 const HALF_SIDE: f64 = 18.0;
-/// Radiance that a lamp's strongest channel gives a white surface that faces it from a metre.
+/// Radiance in its strongest channel that a lamp gives a white surface facing it at a distance of one metre.
 const STRENGTH: f32 = 1.0;
 
-/// A floor, 64 balls, lamps at random places just above the floor, and a camera that sees most of them.
+/// Creates a floor, 64 balls, lamps at random positions just above the floor, and a camera that sees most of
+/// them.
 pub fn balls_and_lamps(asked: BallsAndLamps) -> World {
     let mut world = World::new();
     let side = 2.0 * HALF_SIDE as f32;
@@ -59,12 +59,12 @@ pub fn balls_and_lamps(asked: BallsAndLamps) -> World {
     world
 }
 
-/// The same numbers on every machine.
+/// A random number generator with the same numbers on every machine.
 struct Random(u64);
 
 impl Random {
     fn within(&mut self, least: f64, most: f64) -> f64 {
-        // Knuth's MMIX generator; the upper bits are the random ones.
+        // Knuth's MMIX generator, whose upper bits are the most random.
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         least + (most - least) * ((self.0 >> 11) as f64 / (1_u64 << 53) as f64)
     }

@@ -1,4 +1,5 @@
-//! The room with something for every effect that a frame can do without: each is switched off in turn by a study. Not the room itself.
+//! The room with something for every effect that a frame can do without. The study `effects` switches each of
+//! them off in turn.
 
 use std::sync::Arc;
 
@@ -13,8 +14,8 @@ use lumbre_scene::{
 
 use super::{Air, room};
 
-/// The hazy room, with a sky, ambient and distant light, a mirror, glass, cut-out and bumpy surfaces, and objects that choose their own shading. What a bake brings is still to come: lightmaps and
-/// volumes.
+/// Creates the hazy room with a sky, ambient and distant light, a mirror, glass, cut-out and bumpy surfaces,
+/// and objects that choose their own shading. Lightmaps and irradiance volumes are added by a bake.
 pub fn every_effect() -> World {
     let mut world = room(Air::Hazy);
     world.get_resource_or_insert_with(SceneSettings::default).sky = Vec3::splat(0.05);
@@ -58,7 +59,7 @@ pub fn every_effect() -> World {
     world
         .entity_mut(grating)
         .insert(MaterialTextures { base_color: Some(texture("bars", bars)), ..MaterialTextures::default() });
-    // Ridges: normals that lean to either side in turn.
+    // Normals that lean to either side alternately look like ridges.
     let ridges = |x: u32, _: u32| [if (x / 4).is_multiple_of(2) { 88 } else { 168 }, 128, 240, 255];
     let cavities = |x: u32, y: u32| [if (x / 4 + y / 4).is_multiple_of(2) { 255 } else { 120 }, 0, 0, 255];
     world.entity_mut(bumpy).insert(MaterialTextures {
@@ -90,7 +91,7 @@ mod tests {
 
     use super::*;
 
-    /// All that can be left out, but for what a bake brings.
+    /// All effects that can be left out, except those of a bake.
     #[test]
     fn every_effect_is_called_for() {
         let mut world = every_effect();

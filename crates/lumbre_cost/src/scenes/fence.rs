@@ -1,5 +1,6 @@
-//! A fence, a table and a ball under three lamps that cast shadows, one of each kind of map: a spotlight and a sun that have a size, a point light that has none. Thin
-//! things near the floor and far from it, where maps and filters tell.
+//! A fence, a table and a ball under three lamps with shadows: a spotlight and a sun that have a size, and a
+//! point light that has none, so that there is a shadow map of each kind. Thin objects near the floor and far
+//! from it show the differences between maps and filters.
 
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use lumbre_mesh::shapes;
 use lumbre_optics::{Light, Material, SpotCone};
 use lumbre_scene::{Camera, Mesh, Name, Projection, SceneSettings, Transform};
 
-/// The yard, from above the fence.
+/// Creates the yard, seen from above the fence.
 pub fn fence() -> World {
     let mut world = World::new();
     world.insert_resource(SceneSettings { ambient: Vec3::splat(0.04), ..SceneSettings::default() });

@@ -1,5 +1,5 @@
-//! The yard of the fence with a mirror on its wall, a ball of glass, and two cameras; none of its lamps asks for a shadow. What frames have of mirrors, glass and shadows, and
-//! what they lack, is in it.
+//! The yard of the fence with a mirror on its wall, a ball of glass and two cameras. None of its lamps asks
+//! for shadows. It shows what frames have of mirrors, glass and shadows, and what they lack.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use lumbre_scene::{Camera, Medium, Mesh, Name, Projection, Transform};
 
 use super::fence;
 
-/// The yard, from above the fence and from beside it.
+/// Creates the yard, seen from above the fence and from beside it.
 pub fn mirror_and_glass() -> World {
     let mut world = fence();
     for mut light in world.query::<&mut Light>().iter_mut(&mut world) {

@@ -1,4 +1,4 @@
-//! Scenes that studies make where none are given: each small, each for one question. Not their measuring.
+//! Small scenes that studies create if no files are passed, each for one question.
 
 mod assorted_balls;
 mod ball;

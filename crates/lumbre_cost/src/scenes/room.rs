@@ -1,5 +1,5 @@
-//! A furnished room: a window's worth of glowing panel, lamps that are baked and lamps that are not, a shiny ball, a textured floor. Small
-//! enough to bake in a second.
+//! A furnished room with a glowing panel, lamps that are baked and lamps that are not, a shiny ball and a
+//! textured floor. It can be baked in a second.
 
 use std::sync::Arc;
 
@@ -12,20 +12,20 @@ use lumbre_scene::{
     SceneSettings, StaticObject, TextureReference, Transform,
 };
 
-/// Inner width, height and depth, metres.
+/// Inner width, height and depth in metres.
 const SIZE: DVec3 = DVec3::new(5.0, 2.8, 4.0);
 
-/// What is in the room beside surfaces.
+/// What is in the room besides surfaces and lamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Air {
-    /// Nothing: what rays know of light is all there is.
+    /// Nothing, so that a frame shows the same light as rays.
     Clear,
-    /// A little fog, and ambient light in place of what bounces: as a game without lightmaps would have it.
+    /// Thin fog, and ambient light instead of interreflection, as in a game without lightmaps.
     Hazy,
 }
 
-/// The room, with effects enough for each to be switched off. Its static lamp and its panel are for the baker; in a frame without lightmaps they
-/// shine all the same.
+/// Creates the room. The static lamp and the panel are meant for a bake; in a frame without lightmaps they
+/// shine as well.
 pub fn room(air: Air) -> World {
     let mut world = World::new();
     let fog = Fog { mode: FogMode::Exponential { density: 0.02 }, color: Vec3::new(0.4, 0.45, 0.5) };
@@ -40,10 +40,11 @@ pub fn room(air: Air) -> World {
     world
 }
 
-/// Metres from the middle of one room to that of the next.
+/// Distance in metres between the centres of two neighbouring rooms.
 const APART: f64 = 2.0 * SIZE.x;
 
-/// The room without haze, and another one like it beside it, whose light is its own: what moves in one changes nothing in the other.
+/// Creates the clear room and a copy of it with its own light beside it. Moving something in one room changes
+/// nothing in the other.
 pub fn two_rooms() -> World {
     let mut world = room(Air::Clear);
     let placed =
@@ -176,7 +177,7 @@ fn plastic(color: Vec3, roughness: f32) -> Material {
     Material::from_metallic_roughness(color, 0.0, roughness)
 }
 
-/// A chequered floor.
+/// Returns the texture of a chequered floor.
 fn tiles() -> TextureReference {
     let side = 64;
     let texel = |x: u32, y: u32| {

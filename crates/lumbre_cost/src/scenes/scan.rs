@@ -1,4 +1,5 @@
-//! A thing such as a scanner takes from the world: bumps of every size on something round, and triangles of one size all over it, far more than its shape wants.
+//! An object like those that scanners produce: round with bumps of all sizes, and with triangles of one size
+//! all over, far more than its shape requires.
 
 use std::sync::Arc;
 
@@ -10,14 +11,14 @@ use lumbre_mesh::shapes::tetrahedral_sphere;
 use lumbre_optics::{Light, Material, Surface};
 use lumbre_scene::{Camera, Mesh, Name, Projection, SceneSettings, Transform};
 
-/// Subdivisions of the finest one: 65,536 triangles.
+/// Subdivision depth at full resolution: 65,536 triangles.
 const DEPTH: u32 = 7;
-/// Waves of the surface for each octave: enough for no direction to be seen.
+/// Number of waves per octave, enough to hide their directions.
 const WAVES: u32 = 12;
-/// Octaves, each of twice as many bumps half as high.
+/// Number of octaves; each has twice as many bumps of half the height.
 const OCTAVES: u32 = 5;
 
-/// The scan, under two lamps, before black.
+/// Creates the scan under two lamps in front of black.
 pub fn scan() -> World {
     let mut world = World::new();
     world.insert_resource(SceneSettings { ambient: Vec3::splat(0.1), ..SceneSettings::default() });
@@ -47,7 +48,7 @@ pub fn scan() -> World {
     world
 }
 
-/// A sphere whose points move along its normals by waves of random directions.
+/// Returns a sphere whose vertices are displaced along their normals by waves in random directions.
 fn stone() -> TriangleMesh {
     let sphere = tetrahedral_sphere(1.0, DEPTH, false);
     let waves = waves();
@@ -59,11 +60,11 @@ fn stone() -> TriangleMesh {
     };
     let positions = sphere.positions.iter().map(moved).collect();
     let bumpy = TriangleMesh { positions, uv0: Vec::new(), ..sphere };
-    // A sphere is sound, and stays so.
+    // The displaced sphere is a valid mesh.
     compute_smooth_normals(&bumpy, NormalWeight::Area).map_or(bumpy, |found| found.mesh)
 }
 
-/// Wave vector, phase and height of each wave: the same ones always.
+/// Returns wave vector, phase and height of each wave, always the same ones.
 fn waves() -> Vec<(DVec3, f64, f64)> {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     // Marsaglia's xorshift, to [0, 1).

@@ -1,4 +1,5 @@
-//! A sheet that fills the frame, under one lamp: no rims, so that every pixel compares the arithmetic of lighting and nothing else.
+//! A sheet that fills the frame, under one lamp. Without silhouettes, every pixel compares nothing but the
+//! arithmetic of lighting.
 
 use std::sync::Arc;
 
@@ -8,27 +9,27 @@ use lumbre_mesh::shapes;
 use lumbre_optics::{Light, Material, Surface};
 use lumbre_scene::{Camera, Mesh, Name, Projection, SceneSettings, Transform};
 
-/// What makes the arithmetic hard.
+/// The parameters that make the arithmetic hard.
 #[derive(Clone, Copy, Debug)]
 pub struct Sheet {
-    /// Where all of it is, metres from the origin along each axis.
+    /// Distance of the whole scene from the origin along each axis, in metres.
     pub far: f64,
-    /// How much larger all of it is than a sheet of two metres.
+    /// Size of the scene relative to a sheet of two metres.
     pub scale: f64,
-    /// The exponent of the highlight.
+    /// Exponent of the highlight.
     pub shininess: f32,
-    /// Height of the lamp over the sheet, at the usual scale, metres.
+    /// Height of the lamp over the sheet in metres, before scaling.
     pub height: f64,
-    /// Angle of a distant light over the horizon, radians; without one there is a lamp.
+    /// Angle of a distant light over the horizon in radians; `None` for a lamp.
     pub grazing: Option<f64>,
 }
 
 impl Sheet {
-    /// Nothing is hard.
+    /// The parameters of an easy scene.
     pub const PLAIN: Self = Self { far: 0.0, scale: 1.0, shininess: 20.0, height: 0.8, grazing: None };
 }
 
-/// The sheet, seen aslant from above.
+/// Creates the sheet, seen obliquely from above.
 pub fn sheet(asked: Sheet) -> World {
     let mut world = World::new();
     world.insert_resource(SceneSettings { ambient: Vec3::splat(0.02), ..SceneSettings::default() });
@@ -53,7 +54,7 @@ pub fn sheet(asked: Sheet) -> World {
             world.spawn((Name::new("light"), Light::directional(Vec3::splat(strength as f32)), aimed));
         }
         None => {
-            // As bright at any scale and height.
+            // The illuminance is the same at any scale and height.
             let reach = asked.height * asked.scale;
             let lamp = Light::point(Vec3::splat((0.6 * reach * reach) as f32));
             world.spawn((Name::new("lamp"), lamp, Transform::from_translation(at(DVec3::Y * asked.height))));

@@ -1,5 +1,5 @@
-//! Bakes that are asked for less and less error, and bakes with larger and smaller patches: what they take, what they state, and what is true by a converged bake of the same
-//! texels.
+//! Study of bakes for smaller and smaller errors, and with larger and smaller patches: how long they take,
+//! which error they state, and which error they have, compared with a converged bake of the same texels.
 
 use std::collections::BTreeMap;
 
@@ -19,15 +19,15 @@ use crate::scene_file::SceneFile;
 use crate::scenes::Air;
 use crate::{Conditions, CostError, Plot, Point, Quantity, Spread, Study};
 
-/// Errors that are asked for, as shares.
+/// The requested errors.
 const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01];
 const FEW_ERRORS: &[f64] = &[0.08, 0.03];
-/// The error that bakes of other studies are asked for, in a full and in a quick report.
+/// The error requested from the bakes of other studies, in a full and in a quick report.
 pub(super) const ERROR: f64 = 0.02;
 pub(super) const QUICK_ERROR: f64 = 0.06;
-/// Of the converged bake in a quick report: as long as in the other studies, so that they share it.
+/// Time limit of the converged bake in a quick report, the same as in other studies, so that they share it.
 pub(super) const REFERENCE_SECONDS: f64 = 1.5;
-/// Texels along a patch: the quality's own is 4.
+/// Sides of patches in texels; the default of this quality is 4.
 const PATCHES: &[f32] = &[16.0, 8.0, 2.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];
 const PATCH: &str = "texels along a patch";
@@ -35,7 +35,7 @@ const ASKED: &str = "error asked for, %";
 const STATED: &str = "error stated, % of the mean";
 const FOUND: &str = "error found, % of the mean";
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -48,12 +48,12 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
 fn study() -> Study {
     Study {
         name: "bake".into(),
-        title: "The error that a bake is asked for".into(),
-        question: "Radiosity baked once: what does it take to have less error, what does smoothing save, and is the error that a bake states the true one?".into(),
-        reference: "a converged bake of the same texels with other random numbers and without smoothing, whose own noise is taken off; relative to its mean".into(),
+        title: "Bakes over the requested error".into(),
+        question: "How much longer does a bake take for a smaller error, how much time does smoothing save, and is the error that a bake states the true one?".into(),
+        reference: "a converged bake of the same texels with other random numbers and without smoothing, whose own noise is subtracted; errors are relative to its mean".into(),
         plots: vec![
             Plot {
-                title: "Error against time".into(),
+                title: "Error over time".into(),
                 across: Quantity::Milliseconds,
                 up: Quantity::Error,
                 joined: true,
@@ -61,7 +61,7 @@ fn study() -> Study {
                 ..Plot::default()
             },
             Plot {
-                title: "What a bake states, and what is found".into(),
+                title: "The error found over the error stated".into(),
                 across: Quantity::Figure(STATED.into()),
                 up: Quantity::Figure(FOUND.into()),
                 equal: true,
@@ -72,7 +72,7 @@ fn study() -> Study {
     }
 }
 
-/// A bake that is measured.
+/// A bake to be measured.
 struct Asked {
     series: &'static str,
     label: String,
@@ -94,13 +94,13 @@ fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
     }
     let draft = BakeOptions { quality: Quality::Draft, error: errors[0], ..options };
     all.push(Asked { series: "draft", label: label(errors[0]), options: draft, more: " --quality draft" });
-    // With the least error, so that what is left of it is the patches'.
+    // With the least requested error, the remaining error is due to the patches.
     let least = errors.last().copied().unwrap_or(options.error);
     for &texels in conditions.unless_quick(PATCHES, FEW_PATCHES) {
         let options = BakeOptions { error: least, patch_texels: Some(texels), ..options };
         all.push(Asked { series: "patches", label: format!("{texels} texels a side"), options, more: "" });
     }
-    // What bakes without smoothing cannot be asked for on the command line.
+    // The command line has no option for bakes without smoothing.
     for &error in errors.iter().take(conditions.unless_quick(2, 1)) {
         let options = BakeOptions { error, denoise: false, ..options };
         all.push(Asked { series: "without smoothing", label: label(error), options, more: "" });
@@ -124,7 +124,7 @@ fn of_scene(
         converged(conditions, &options, conditions.reference_time(12.0, REFERENCE_SECONDS));
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.0), part(0.4)])?;
     measured.study.notes.push(format!(
-        "The converged bake of the {} took {:.0} s and states {} of its mean for itself.",
+        "The converged bake of the {} took {:.0} s and states an error of {} of its mean.",
         scene.name,
         truth.report.seconds,
         percent(truth.report.error_of_mean)
@@ -197,7 +197,7 @@ fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
     if let Some(ratio) = Spread::of(&ratios) {
         let most = ratios.iter().copied().fold(0.0, f64::max);
         findings.push(format!(
-            "The errors found in bakes of the {} are {} times those that they state in the median, and {} times at most.",
+            "The true error of a bake of the {} is {} times the stated one in the median, and {} times at most.",
             scene.name,
             rounded(ratio.median),
             rounded(most)
@@ -211,7 +211,7 @@ fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
         && much.relative_rmse - little.relative_rmse > much.uncertainty.max(little.uncertainty)
     {
         findings.push(format!(
-            "From {} to {} the error falls from {} to {}, for {}.",
+            "From {} to {} the error falls from {} to {}, in {}.",
             coarse.label,
             fine.label,
             error_of(&much),
@@ -223,14 +223,14 @@ fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
     findings
 }
 
-/// The coarsest patches beside the finest: their number, and what they cost and leave.
+/// Compares the coarsest patches with the finest: their numbers, times and errors.
 fn of_patches(points: &[&Point]) -> Option<String> {
     let all: Vec<&&Point> = points.iter().filter(|point| point.parameters.contains_key(PATCH)).collect();
     let (coarse, fine) = (all.first()?, all.last()?);
     let count = |point: &Point| point.counts.get("patches").copied().map(counted);
     let (long, short) = (fine.milliseconds?, coarse.milliseconds?);
     Some(format!(
-        "{} patches of {} leave an error of {}, {} of {} one of {}, in {}.",
+        "{} patches of {} leave an error of {}; {} patches of {} leave {}, in {}.",
         count(coarse)?,
         coarse.label,
         error_of(&coarse.error?),

@@ -1,4 +1,5 @@
-//! Every effect of a scene switched off in turn: what a frame saves without it, and what its picture loses.
+//! Study of every effect of a scene, switched off in turn: how much time a frame saves, and how much its
+//! picture changes.
 
 use lumbre_bake::{BakeOptions, Probes};
 use lumbre_render::{FrameOptions, removable_effects};
@@ -14,20 +15,21 @@ use crate::scene_file::SceneFile;
 use crate::scenes::{Air, every_effect, room};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
-/// Seconds for the frames of each scene of a full report.
+/// Seconds for the frames of each scene in a full report.
 const SECONDS: f64 = 9.0;
-/// Of the lightmaps of the room.
+/// Approximate number of texels of the room's lightmaps.
 const TEXELS: f64 = 4_000.0;
-/// Effects that are told of, the costliest.
-const TOLD: usize = 3;
+/// Number of the most expensive effects that the findings name.
+const MAX_NAMED: usize = 3;
 const SAVED: &str = "saved, ms";
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    // A frame for each of many effects, most of which have shaders of their own.
+    // There are frames for many effects, most of which need shaders of their own, so the pictures are
+    // smaller.
     let size = [conditions.size.0, conditions.size.1].map(|side| (2 * side / 3).max(8));
     let conditions = &Conditions { size: (size[0], size[1]), ..*conditions };
     let mut measured = Measured { study: study(), ..Measured::default() };
@@ -42,7 +44,8 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
     Ok(measured)
 }
 
-/// A room with every effect that can be left out, baked for its lightmaps and volumes; a quick report has half of them.
+/// Creates a room with every effect that can be left out, baked for its lightmaps and volumes; in a quick
+/// report, a room with half of the effects.
 fn of_its_own(conditions: &Conditions<'_>) -> Result<SceneFile, CostError> {
     if conditions.quick {
         return SceneFile::made(conditions, "hazy-room", room(Air::Hazy));
@@ -58,8 +61,8 @@ fn of_its_own(conditions: &Conditions<'_>) -> Result<SceneFile, CostError> {
 fn study() -> Study {
     Study {
         name: "effects".into(),
-        title: "What each effect costs and gives".into(),
-        question: "Every effect that a scene calls for, left out in turn: how much sooner is the frame there, and how much of the picture is lost?".into(),
+        title: "What each effect costs and contributes".into(),
+        question: "Every effect that a scene calls for is left out in turn. How much time does a frame save, and how large is the resulting error?".into(),
         reference: "the frame with all effects".into(),
         plots: vec![Plot {
             title: "Frames without one of their effects".into(),
@@ -80,7 +83,7 @@ fn of_scene(
 ) -> Result<(), CostError> {
     let mut whole = scene.open(conditions.aspect())?;
     let effects = removable_effects(&Census::of(&mut whole), &FrameOptions::default());
-    // Variants that count are compiled for nothing else: here for the whole frame alone.
+    // Counting needs shader variants of its own, so only the frame with all effects is counted.
     let whole = Frame::new(whole, FrameOptions::default()).sharing("effects");
     let mut frames = vec![whole.counting_lights(!conditions.quick)];
     for effect in &effects {
@@ -110,7 +113,7 @@ fn point(
     whole: &DrawnFrame,
     frame: &DrawnFrame,
 ) -> Point {
-    // Of the same rounds: what the machine does besides meets both.
+    // Differences are taken between times of the same round, so that other load on the machine affects both.
     let saved = Spread::of(&whole.times.iter().zip(&frame.times).map(|(a, b)| a - b).collect::<Vec<_>>());
     let figures = saved.map(|saved| {
         [
@@ -141,7 +144,7 @@ fn findings(
     points: &[Point],
 ) -> Vec<String> {
     let Some(time) = whole.spread() else { return Vec::new() };
-    // By which factor the frame is slower with it, and what is lost without it.
+    // Each effect with the factor by which the frame is slower with it, and the error without it.
     let known: Vec<(&str, Spread, f64)> = effects
         .iter()
         .zip(without)
@@ -156,10 +159,10 @@ fn findings(
     let share = |ratio: f64| 100.0 * (1.0 - 1.0 / ratio);
     let told: Vec<String> = costly
         .iter()
-        .take(TOLD)
+        .take(MAX_NAMED)
         .map(|(effect, ratio, error)| {
             format!(
-                "without {effect} it takes {} % less ({} to {}) and loses {} of the picture",
+                "without {effect} it takes {} % less time ({} to {}) and has an error of {}",
                 rounded(share(ratio.median)),
                 rounded(share(ratio.lower)),
                 rounded(share(ratio.upper)),
@@ -179,7 +182,7 @@ fn findings(
     let names: Vec<&str> = open.iter().map(|(effect, ..)| *effect).collect();
     if let Some(fewest) = open.iter().map(|(_, ratio, _)| ratio.rounds).min() {
         findings.push(format!(
-            "Whether {} anything in the {scene} is not distinguishable in {}.",
+            "Whether {} any time in the {scene} is not distinguishable in {}.",
             listed_with(&names, "costs", "cost", "or"),
             rounds(fewest)
         ));
@@ -192,12 +195,13 @@ fn findings(
     if !spared.is_empty() {
         findings.push(format!("The frame of the {scene} takes longer without {}.", listed(&spared, "or")));
     }
-    // What costs the most per loss: the first to go.
+    // The effect with the highest cost relative to its contribution is the first to leave out.
     let worth = |(_, ratio, error): &&&(&str, Spread, f64)| (ratio.median - 1.0) / error.max(1e-9);
     if let Some((effect, ..)) = costly.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)))
         && costly.len() > 1
     {
-        findings.push(format!("What saves the most for what is lost in the {scene}: to leave out {effect}."));
+        findings
+            .push(format!("The effect of the {scene} that saves the most time for its error is {effect}."));
     }
     let unseen: Vec<&str> =
         known.iter().filter(|(.., error)| *error == 0.0).map(|(effect, ..)| *effect).collect();

@@ -1,4 +1,5 @@
-//! Many lamps: all for every fragment, by lists of objects, by clusters; and lamps that end where they bring too little to be seen.
+//! Study of many lamps: evaluating all of them in every fragment, finding them by lists per object or by
+//! clusters, and ending them where their light is too weak to be seen.
 
 use lumbre_render::{FrameOptions, LightLists, RenderingPath};
 
@@ -11,7 +12,7 @@ use crate::scene_file::SceneFile;
 use crate::scenes::{BallsAndLamps, balls_and_lamps};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
-/// How lamps are found, each with what it is called.
+/// The ways to find lamps, with their names.
 const LISTS: [(LightLists, &str); 3] = [
     (LightLists::Everything, "every lamp everywhere"),
     (LightLists::Objects, "lists of objects"),
@@ -19,29 +20,30 @@ const LISTS: [(LightLists, &str); 3] = [
 ];
 const MANY: &[u32] = &[1, 4, 16, 64, 256, 1024];
 const FEW: &[u32] = &[1, 16, 128];
-/// Where the lamps of the first part end: the part of white that they bring there.
+/// The fraction of white at which the lamps of the first part end.
 const USUAL: f32 = 0.1;
 const THRESHOLDS: &[f32] = &[0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002];
 const FEW_THRESHOLDS: &[f32] = &[0.1, 0.01];
-/// How wide and high the pictures of a full report are here, beside those of other studies.
+/// Width and height of the pictures of a full report relative to those of other studies.
 const PART: f64 = 2.0 / 3.0;
-/// With more lamps to draw a frame takes longer than to compile its shaders.
+/// With more lamps than this, drawing a frame takes longer than compiling its shaders.
 const SHARING: u32 = 64;
 const LAMPS: &str = "lamps";
 const IN_CLUSTER: &str = "lamps in a cluster's list";
 const THRESHOLD: &str = "threshold, % of white";
-/// Pixels along the side of the smallest tiles that have lists.
+/// Sides in pixels of the smallest tiles that have lists.
 const TILES: &[u32] = &[32, 64, 128, 256];
 const FEW_TILES: &[u32] = &[32, 128];
 const TILE: &str = "pixels along a tile";
 const SIZED: &str = "clusters by size";
 const ENDING: &str = "lamps that end, by clusters";
-/// Seconds for the frames of each part of a full report.
+/// Seconds for the frames of each part in a full report.
 const SECONDS: f64 = 8.0;
-/// Relative RMSE that f32 leaves where a thousand lamps are added in another order: a thousand times half of its unit in the last place.
+/// Relative RMSE of f32 if a thousand lamps are added in another order: a thousand times half a unit in the
+/// last place.
 const ROUNDING: f64 = 6e-5;
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -51,7 +53,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         of_files(conditions, &mut measured)?;
         return Ok(measured);
     }
-    // A thousand lamps in every pixel take a second of a frame of the whole size.
+    // With a thousand lamps in every pixel, a frame of full size would take a second.
     let part = conditions.unless_quick(PART, 1.0);
     let size = [conditions.size.0, conditions.size.1].map(|side| ((f64::from(side) * part) as u32).max(8));
     let conditions = &Conditions { size: (size[0], size[1]), ..*conditions };
@@ -67,11 +69,11 @@ fn study() -> Study {
     Study {
         name: "lamps".into(),
         title: "Many lamps".into(),
-        question: "A frame of balls on a floor under more and more lamps that each reach three metres: what does it cost to ask every lamp everywhere, and what to find those that matter first? And where may a lamp end?".into(),
-        reference: "the same frame with every lamp everywhere; for lamps that end, with lamps that do not".into(),
+        question: "Balls on a floor are drawn under more and more lamps that each reach three metres. What does it cost to evaluate every lamp everywhere, and what does it cost to find the relevant ones first? And where may the light of a lamp end?".into(),
+        reference: "the same frame with every lamp evaluated everywhere; for lamps that end, the frame with lamps that do not end".into(),
         plots: vec![
             Plot {
-                title: "Time against the number of lamps".into(),
+                title: "Time over the number of lamps".into(),
                 across: Quantity::Parameter(LAMPS.into()),
                 up: Quantity::Milliseconds,
                 series: lists(),
@@ -79,7 +81,7 @@ fn study() -> Study {
                 ..Plot::default()
             },
             Plot {
-                title: "Time against the size of clusters".into(),
+                title: "Time over the size of clusters".into(),
                 across: Quantity::Parameter(TILE.into()),
                 up: Quantity::Milliseconds,
                 series: vec![SIZED.into()],
@@ -87,7 +89,7 @@ fn study() -> Study {
                 ..Plot::default()
             },
             Plot {
-                title: "Where lamps end: error against time".into(),
+                title: "Where lamps end: error over time".into(),
                 across: Quantity::Milliseconds,
                 up: Quantity::Error,
                 series: vec![ENDING.into()],
@@ -100,12 +102,13 @@ fn study() -> Study {
     }
 }
 
-/// A frame whose lamps are found so. On every machine by the same path: lists are what is compared.
+/// Returns the options of a frame that finds lamps in this way. The rendering path is the same on every
+/// machine, since the lists are what is compared.
 fn found_by(light_lists: LightLists) -> FrameOptions {
     FrameOptions { light_lists, rendering_path: RenderingPath::Forward, ..FrameOptions::default() }
 }
 
-/// Lamps, with the times of each list.
+/// Frames by number of lamps, one for each kind of list.
 type TimesByNumber = Vec<(u32, Vec<DrawnFrame>)>;
 
 fn by_number(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<TimesByNumber, CostError> {
@@ -117,7 +120,7 @@ fn by_number(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<Tim
         for (light_lists, name) in LISTS {
             let options = found_by(light_lists);
             let frame = Frame::new(scene.open(conditions.aspect())?, options);
-            // The longer the lists, the longer it takes to count: those of all lamps are known without it.
+            // Counting takes longer the longer the lists are. The counts for all lamps are known without it.
             let frame = frame.counting_lights(!conditions.quick && light_lists == LightLists::Clusters);
             frames.push(if lamps <= SHARING { frame.sharing(name) } else { frame });
         }
@@ -156,7 +159,7 @@ fn point(conditions: &Conditions<'_>, frame: &DrawnFrame, series: &str, lamps: u
 }
 
 fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
-    // Neighbouring numbers of lamps with the same winners are told together.
+    // Neighbouring numbers of lamps with the same winners are reported together.
     let mut stretches: Vec<(u32, u32, Vec<&str>)> = Vec::new();
     for (lamps, _) in times {
         let winners = cheapest_with(study, *lamps);
@@ -180,7 +183,7 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
             (ratio_of(&everything.times, &clusters.times), ratio_of(&objects.times, &clusters.times))
     {
         findings.push(format!(
-            "With {lamps} lamps asking every lamp everywhere takes {} times as long as clusters; finding them by lists of objects, {} times as long.",
+            "With {lamps} lamps, evaluating every lamp everywhere takes {} times as long as with clusters; with lists of objects it takes {} times as long.",
             factor(&all),
             factor(&by_object)
         ));
@@ -188,7 +191,7 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
             (everything.invocations, clusters.light_evaluations)
         {
             findings.push(format!(
-                "Asked everywhere, these lamps are evaluated {} times in a frame ({fragments} fragments), by clusters {} times; {} of the latter evaluations bring more than 1/255.",
+                "Evaluated everywhere, these lamps are evaluated {} times in a frame ({fragments} fragments); with clusters, {} times, of which {} contribute more than 1/255.",
                 counted(fragments as f64 * f64::from(*lamps)),
                 counted(few as f64),
                 percent(contributing as f64 / (few as f64).max(1.0))
@@ -202,9 +205,9 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
         .map(|error| error.relative_rmse)
         .fold(0.0, f64::max);
     findings.push(match largest <= ROUNDING {
-        true => format!("The lists leave out nothing that is seen: the pictures differ by {} at most.", percent(largest)),
+        true => format!("The lists leave out nothing visible: the pictures differ by {} at most.", percent(largest)),
         false => format!(
-            "The lists do not show the same picture: they differ by up to {}, where roundings would leave {} at most.",
+            "The lists do not give the same picture: the pictures differ by up to {}, while rounding explains {} at most.",
             percent(largest),
             percent(ROUNDING)
         ),
@@ -212,7 +215,8 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
     findings
 }
 
-/// The lists that are the cheapest with so many lamps: one where the times decide, several where they do not, in the order of [`LISTS`].
+/// Returns the kinds of lists that are the cheapest with this many lamps, in the order of [`LISTS`]: one if
+/// the times decide, several if they do not.
 fn cheapest_with(study: &Study, lamps: u32) -> Vec<&str> {
     let is_list = |series: &str| LISTS.iter().any(|(_, name)| *name == series);
     let here = study.points.iter().filter(|point| is_list(&point.series));
@@ -224,7 +228,8 @@ fn cheapest_with(study: &Study, lamps: u32) -> Vec<&str> {
     timed.iter().filter(|(_, time)| is_level(time)).map(|(series, _)| *series).collect()
 }
 
-/// The most lamps by clusters of several sizes: small ones have short lists, and many of them.
+/// Measures the largest number of lamps with clusters of several sizes. Small clusters have short lists, but
+/// there are many of them.
 fn by_tile(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), CostError> {
     let lamps = conditions.unless_quick(MANY, FEW).last().copied().unwrap_or(1);
     let tiles = conditions.unless_quick(TILES, FEW_TILES);
@@ -254,7 +259,7 @@ fn by_tile(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), C
         && let Some(ratio) = ratio_of(&coarsest.times, &finest.times)
     {
         let finding = format!(
-            "With {lamps} lamps, tiles of {} pixels in place of {} lengthen a cluster's list from {} lamps to {}, and a frame takes {} of the time.",
+            "With {lamps} lamps, tiles of {} pixels instead of {} lengthen the list of a cluster from {} lamps to {}; a frame takes {} times as long.",
             tiles[tiles.len() - 1],
             tiles[0],
             in_list(fine),
@@ -266,7 +271,7 @@ fn by_tile(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), C
     Ok(())
 }
 
-/// What the frame of so many lamps that are asked everywhere is called.
+/// Returns the label of the frame that evaluates this many lamps everywhere.
 fn everywhere(lamps: u32) -> String {
     format!("{lamps} everywhere")
 }
@@ -321,19 +326,19 @@ fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<
         })
         .collect();
     measured.study.findings.push(format!(
-        "{lamps} lamps that end where they bring little of white, against lamps without an end: {}.",
+        "{lamps} lamps that end where they contribute a small fraction of white, compared with lamps that do not end: {}.",
         told.join("; ")
     ));
     Ok(())
 }
 
-/// The lamps of given files by every list.
+/// Measures the lamps of the files that were passed with every kind of list.
 fn of_files(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), CostError> {
     measured.study.question =
-        "The lamps of each scene: asked everywhere, found by lists of objects, found by clusters.".into();
+        "What do frames cost if the lamps of each scene are evaluated everywhere, found by lists of objects, or found by clusters?".into();
     measured.study.plots.truncate(1);
     measured.study.plots[0] = Plot {
-        title: "Time against the number of lamps".into(),
+        title: "Time over the number of lamps".into(),
         across: Quantity::Parameter(LAMPS.into()),
         up: Quantity::Milliseconds,
         ..Plot::default()
@@ -362,7 +367,7 @@ fn of_files(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), 
             .filter_map(|point| point.error)
             .map(|error| error.relative_rmse)
             .fold(0.0, f64::max);
-        // Their errors are roundings: only the times are weighed.
+        // The errors are rounding errors, so only the times are compared.
         let even: Vec<Point> = points
             .iter()
             .map(|point| Point {

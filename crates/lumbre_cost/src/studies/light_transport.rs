@@ -1,5 +1,5 @@
-//! From the frame to the truth: the same scene as a frame with one thing more at a time, by the ray tree, and by paths; against a converged picture
-//! of all light.
+//! Study of the difference between a frame and physically correct light: frames with more and more effects,
+//! the ray tree and paths, compared with a converged picture of all light.
 
 use std::time::Instant;
 
@@ -21,21 +21,21 @@ use crate::scenes::Air;
 use crate::traced::{ray_tree, traced};
 use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
-/// Paths a pixel.
+/// Numbers of paths per pixel.
 const PATHS: &[u32] = &[4, 16];
 const FEW_PATHS: &[u32] = &[2, 6];
-/// Reflections after which paths are cut short.
+/// Numbers of reflections after which paths are cut short.
 const BOUNCES: &[u32] = &[0, 1, 2, 4];
 const FEW_BOUNCES: &[u32] = &[0, 2];
 const REFLECTIONS: &str = "reflections on the way";
-/// Pictures are this part as wide and high as elsewhere: paths take their time.
+/// Factor by which pictures are smaller along each side than in other studies, as path tracing takes long.
 const SMALLER: u32 = 3;
 const SECONDS: f64 = 4.0;
 const CUT: &str = "paths cut short";
 const BAKE: &str = "baked before, ms";
 const WITH_LIGHTMAPS: &str = "and lightmaps";
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -46,7 +46,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
     let mut measured = over_scenes(conditions, study(), ("room", Air::Clear), |scene, told, measured| {
         of_scene(&smaller, scene, told, measured)
     })?;
-    let note = "Paths of a picture are the first of those of the reference: with an eighth of its paths an error looks a sixteenth smaller than it is.";
+    let note = "The paths of a picture are also the first paths of the reference. With an eighth of the reference's paths, the error appears smaller than it is by a sixteenth.";
     measured.study.notes.push(note.into());
     Ok(measured)
 }
@@ -54,11 +54,11 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
 fn study() -> Study {
     Study {
         name: "transport".into(),
-        title: "From the frame to the truth".into(),
-        question: "Where does the error of a frame come from: from shadows, from samples, from the light between surfaces? And what does the same error cost by rays?".into(),
-        reference: "all light by paths, with many samples of every pixel".into(),
+        title: "Frames compared with all light".into(),
+        question: "Where does the error of a frame come from: shadows, samples, or light that surfaces exchange? And how long do rays take to reach the same error?".into(),
+        reference: "all light, computed by path tracing with many samples per pixel".into(),
         plots: vec![Plot {
-            title: "Error against time".into(),
+            title: "Error over time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
             joined: true,
@@ -86,7 +86,8 @@ fn of_scene(
     };
     let most = conditions.unless_quick(128, 48);
     let (picture, report) = traced(conditions, scene, &paths(most))?;
-    // The report states it of the mean; errors are of the root mean square.
+    // The tracer states the error relative to the mean; errors in reports are relative to the root mean
+    // square.
     let open = report.standard_error.unwrap_or(0.0) * mean_over_root_mean_square(&picture);
     let reference = measured.keep_reference(&format!("{} by {most} paths", scene.name), picture);
     let uncertain = Some(ErrorOf { uncertainty: open, ..ErrorOf::default() });
@@ -187,7 +188,7 @@ fn of_scene(
     Ok(())
 }
 
-/// The mean of all channels over their root mean square; 0 for a black picture.
+/// Returns the mean of all channels divided by their root mean square; 0 for a black picture.
 fn mean_over_root_mean_square(picture: &Picture) -> f64 {
     let numbers = 3.0 * picture.radiance.len().max(1) as f64;
     let mean = picture.radiance.iter().map(|pixel| pixel.element_sum()).sum::<f64>() / numbers;
@@ -210,11 +211,11 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
         };
         let change = match (was.relative_rmse - is.relative_rmse).abs() > open {
             true => format!(
-                "takes the error from {} to {}",
+                "changes the error from {} to {}",
                 percent(was.relative_rmse),
                 percent(is.relative_rmse)
             ),
-            false => "changes the error by less than the reference leaves open".to_owned(),
+            false => "changes the error by less than the uncertainty of the reference".to_owned(),
         };
         said.push(format!("\"{}\" {change} {cost}", pair[1].label));
     }
@@ -232,18 +233,20 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
             .min_by(|a, b| a.2.median.total_cmp(&b.2.median));
         let paths = match reached {
             Some((point, _, slow)) => format!(
-                "paths get there with {}, in {}: {}",
+                "path tracing reaches this error with {}, in {}: {}",
                 point.label,
                 milliseconds(&slow),
                 times_of(&slow, &time)
             ),
-            None => "no number of paths that was tried gets there".to_owned(),
+            None => {
+                "path tracing does not reach this error with any number of paths that was tried".to_owned()
+            }
         };
         let bake = frame.figures.get(BAKE).map_or(String::new(), |ms| {
             format!(", after a bake of {} s", crate::findings::rounded(ms / 1e3))
         });
         findings.push(format!(
-            "The best frame (\"{}\") is off by {} in {}{bake}; {paths}. The reference leaves {} open.",
+            "The best frame (\"{}\") has an error of {} and takes {}{bake}; {paths}. The uncertainty of the reference is {}.",
             frame.label,
             percent(error),
             milliseconds(&time),
@@ -255,7 +258,7 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
     findings
 }
 
-/// How much of the light comes after so many reflections: what paths that are cut there are off by.
+/// Reports how much light arrives after a number of reflections: the error of paths that are cut short there.
 fn of_bounces(points: &[&Point]) -> Option<String> {
     let cut = points.iter().filter(|point| point.series.starts_with(CUT));
     let told: Vec<String> = cut
@@ -266,7 +269,5 @@ fn of_bounces(points: &[&Point]) -> Option<String> {
         })
         .collect();
     let all = !told.is_empty();
-    all.then(|| {
-        format!("Paths that are cut short after so many reflections are off by: {}.", told.join("; "))
-    })
+    all.then(|| format!("Errors of paths that are cut short, by number of reflections: {}.", told.join("; ")))
 }

@@ -1,4 +1,4 @@
-//! Lightmaps by their density and their format: bytes and time against what a frame loses.
+//! Study of the density and the format of lightmaps: their sizes and times against what a frame loses.
 
 use std::sync::Arc;
 
@@ -22,10 +22,11 @@ use crate::scene_file::SceneFile;
 use crate::scenes::Air;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
-/// Texels of the reference; each density below has a quarter of the texels of the one before.
+/// Approximate number of texels of the reference; each lower density has a quarter of the texels of the one
+/// before.
 const TEXELS: f64 = 20_000.0;
 const FEW_TEXELS: f64 = 4_000.0;
-/// Densities, as parts of the densest.
+/// Reductions of the density relative to the densest.
 const PARTS: &[f64] = &[1.0, 2.0, 4.0, 8.0];
 const FEW_PARTS: &[f64] = &[1.0, 2.0, 4.0];
 const DENSITY: &str = "texels along a metre";
@@ -33,7 +34,7 @@ const BYTES: &str = "bytes of textures in that format";
 const BAKE: &str = "baked before, ms";
 const SECONDS: f64 = 5.0;
 
-/// How texels are kept on the GPU, and in which file.
+/// The format of texels on the GPU and in a file.
 #[derive(Clone, Copy)]
 enum Format {
     Halves,
@@ -52,7 +53,7 @@ impl Format {
         }
     }
 
-    /// Bytes of a texel on the GPU.
+    /// Returns the bytes of a texel on the GPU.
     fn bytes(self) -> f64 {
         match self {
             Self::Halves => 8.0,
@@ -60,7 +61,8 @@ impl Format {
         }
     }
 
-    /// The map as it is after it was kept so, and the bytes of its file. Frames hold all maps as half floats, which have every value of the packed formats.
+    /// Returns a map after it was encoded and decoded, and the size of its file in bytes. Frames store all
+    /// maps as half floats, which represent every value of the packed formats.
     fn kept(self, map: &LightmapImage) -> Result<(LightmapImage, usize), CostError> {
         Ok(match self {
             Self::Halves => {
@@ -78,7 +80,7 @@ impl Format {
     }
 }
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -92,14 +94,14 @@ fn study() -> Study {
     Study {
         name: "lightmaps".into(),
         title: "Density and format of lightmaps".into(),
-        question: "How many texels along a metre, and how many bytes for each: what does a frame lose, and what does it cost?".into(),
-        reference: "the frame with the densest maps, in half floats".into(),
+        question: "How do the density of lightmaps and the bytes per texel affect the error and the time of a frame?".into(),
+        reference: "the frame with the densest lightmaps, in half floats".into(),
         notes: vec![
-            "Frames unpack lightmaps when they are uploaded: on the device every format is half floats, so that the times of formats are those of one texture. Bytes are what each format takes itself."
+            "Lightmaps are unpacked when they are uploaded. On the device every format becomes half floats, so that all formats should take the same time. Bytes are those of the format itself."
                 .into(),
         ],
         plots: vec![Plot {
-            title: "Error against bytes".into(),
+            title: "Error over bytes".into(),
             across: Quantity::Count(BYTES.into()),
             up: Quantity::Error,
             joined: true,
@@ -110,7 +112,7 @@ fn study() -> Study {
     }
 }
 
-/// Maps of one density.
+/// The maps of one density.
 struct Maps {
     baked: Baked,
     options: BakeOptions,
@@ -143,7 +145,8 @@ fn of_scene(
     let mut points = Vec::new();
     for (place, maps) in all.iter_mut().enumerate() {
         for format in Format::ALL {
-            // Formats matter alike at every density: the densest two tell, or the densest alone.
+            // Formats make the same difference at every density, so only the two highest densities are
+            // measured in all formats, or only the highest.
             if place > conditions.unless_quick(1, 0) && !matches!(format, Format::Halves) {
                 continue;
             }
@@ -164,14 +167,14 @@ fn of_scene(
     Ok(())
 }
 
-/// Bytes of the textures on the GPU, of their files, and texels.
+/// Bytes of the textures on the GPU, bytes of their files, and number of texels.
 struct Sizes {
     textures: f64,
     files: f64,
     texels: f64,
 }
 
-/// The scene with maps of a bake as they are after they were kept in a format.
+/// Creates the scene with the maps of a bake after they were encoded in a format and decoded.
 fn in_format(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
@@ -191,7 +194,7 @@ fn in_format(
         sizes.textures += format.bytes() * image.texels.len() as f64;
         kept.push((Arc::clone(&map.image), Arc::new(image)));
     }
-    // Read once more the scene has the same entities; they get what the bake gave them, with other maps.
+    // The scene is read again and has the same entities. They get the results of the bake, with other maps.
     let mut world = scene.open(conditions.aspect())?;
     let mut lit = baked.query::<(Entity, &Mesh, &Lightmap)>();
     for (entity, mesh, map) in lit.iter(baked) {
@@ -208,7 +211,7 @@ fn in_format(
 fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Format, sizes: Sizes) -> Point {
     let counts = [(BYTES, sizes.textures), ("bytes of the files", sizes.files), ("texels", sizes.texels)];
     let series = scene.series(conditions, format.name());
-    // Frames read the half floats that stand beside a packed file.
+    // Frames read the half floats that are stored beside a packed file.
     let command = match format {
         Format::Halves => format!(
             "lumbre bake {} -o baked.glb {} --exr half && {}",
@@ -229,7 +232,7 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Fo
     }
 }
 
-/// What formats and densities lose, and whether their times differ.
+/// Reports what formats and densities lose, and whether their times differ.
 fn finding(scene: &str, points: &[Point]) -> Vec<String> {
     let [reference, others @ ..] = points else { return Vec::new() };
     let errors = |points: &[&Point]| {
@@ -250,12 +253,12 @@ fn finding(scene: &str, points: &[Point]) -> Vec<String> {
         let formats: Vec<&str> = formats.iter().map(String::as_str).collect();
         let less = if errors(&same_density) < next { "less than" } else { "not less than" };
         findings.push(format!(
-            "In the {scene} {}: {less} half the density, which loses {}.",
+            "In the {scene}, {}: {less} half the density, which loses {}.",
             listed(&formats, "and"),
             percent(next)
         ));
     }
-    // In bytes in place of time.
+    // The front is one of bytes and errors, so the bytes replace the times.
     let by_bytes: Vec<Point> = points
         .iter()
         .filter_map(|point| {
@@ -278,15 +281,17 @@ fn finding(scene: &str, points: &[Point]) -> Vec<String> {
         })
         .collect();
     let front: Vec<&str> = front.iter().map(String::as_str).collect();
-    findings.push(format!("The least bytes for their error in the {scene}: {}.", listed(&front, "and")));
+    findings.push(format!(
+        "The lightmaps of the {scene} with the fewest bytes for their error: {}.",
+        listed(&front, "and")
+    ));
     let told_apart = others.iter().any(|point| match (point.milliseconds, reference.milliseconds) {
         (Some(time), Some(whole)) => time.is_below(&whole) || whole.is_below(&time),
         _ => false,
     });
     if !told_apart {
-        findings.push(format!(
-            "The frames of the {scene} take the same time with all of them, as far as the times tell."
-        ));
+        findings
+            .push(format!("The times of the {scene}'s frames with these lightmaps are not distinguishable."));
     }
     findings
 }

@@ -1,4 +1,5 @@
-//! The studies, a file each: a question under given conditions in, points and findings out. Not their files and not their drawing.
+//! The studies, each in a file of its own: it answers a question under given conditions with points and
+//! findings.
 
 mod bake;
 mod effects;
@@ -21,33 +22,40 @@ use crate::scene_file::SceneFile;
 use crate::scenes::{Air, room};
 use crate::{Conditions, CostError, Study};
 
-/// A study that can be asked for.
+/// A study that can be requested.
 #[derive(Clone, Copy, Debug)]
 pub struct StudyKind {
-    /// The name on the command line.
+    /// Its name on the command line.
     pub name: &'static str,
-    /// What it is about, in a few words.
+    /// What it measures, in a few words.
     pub about: &'static str,
-    /// Which way of measuring it that is. Whoever changes what its points, times or errors mean raises it: `--resume` keeps no study of another method, and `--compare` says so.
+    /// Version of the way of measuring. It must be increased when the meaning of points, times or errors
+    /// changes: `--resume` does not keep studies measured by another method, and `--compare` does not compare
+    /// them.
     pub method: u32,
-    /// Measures it.
+    /// Runs the study.
     pub run: fn(&Conditions<'_>) -> Result<Measured, CostError>,
 }
 
 /// All studies, in the order of the page.
 pub const STUDIES: &[StudyKind] = &[
     StudyKind { name: "shading", about: "flat, Gouraud and Phong shading", method: 2, run: shading::run },
-    StudyKind { name: "scan", about: "the same on a scan at several resolutions", method: 2, run: scan::run },
+    StudyKind {
+        name: "scan",
+        about: "flat, Gouraud and Phong shading of a scan at several resolutions",
+        method: 2,
+        run: scan::run,
+    },
     StudyKind {
         name: "need",
-        about: "shading by need over the error allowed",
+        about: "shading by need over the allowed error",
         method: 2,
         run: shading_by_need::run,
     },
     StudyKind { name: "lamps", about: "many lights, and how they are found", method: 2, run: lamps::run },
     StudyKind {
         name: "shadows",
-        about: "shadow maps by size and filter, against rays",
+        about: "shadow maps by size and filter, compared with rays",
         method: 2,
         run: shadows::run,
     },
@@ -57,32 +65,42 @@ pub const STUDIES: &[StudyKind] = &[
         method: 2,
         run: effects::run,
     },
-    StudyKind { name: "bake", about: "the error that a bake is asked for", method: 2, run: bake::run },
+    StudyKind { name: "bake", about: "bakes over the requested error", method: 2, run: bake::run },
     StudyKind {
         name: "preprocessing",
-        about: "light that bounces, before the game or in it",
+        about: "interreflected light, baked before the game",
         method: 2,
         run: preprocessing::run,
     },
     StudyKind {
         name: "transport",
-        about: "from the frame to the truth",
+        about: "frames compared with all light by path tracing",
         method: 2,
         run: light_transport::run,
     },
-    StudyKind { name: "tour", about: "every camera's frame against the ray tree", method: 2, run: tour::run },
+    StudyKind {
+        name: "tour",
+        about: "the frames of all cameras, compared with the ray tree",
+        method: 2,
+        run: tour::run,
+    },
     StudyKind {
         name: "reflection",
-        about: "reflection models against Phong's",
+        about: "reflection models, compared with Phong's",
         method: 2,
         run: reflection::run,
     },
     StudyKind { name: "lightmaps", about: "density and format of lightmaps", method: 2, run: lightmaps::run },
-    StudyKind { name: "precision", about: "f32 on the device against f64", method: 2, run: precision::run },
+    StudyKind {
+        name: "precision",
+        about: "f32 on the device, compared with f64",
+        method: 2,
+        run: precision::run,
+    },
 ];
 
-/// A study of each file that was given, or, without one, of the room in this air under this name. `of_scene` is told which share of the study, from 0 to 1, a
-/// scene begins and ends with.
+/// Runs `of_scene` for each file that was passed or, if there is none, for the room with this air, under the
+/// name `name`. `of_scene` gets the fractions of the study that are done before and after the scene.
 fn over_scenes(
     conditions: &Conditions<'_>,
     study: Study,
@@ -92,7 +110,7 @@ fn over_scenes(
     over_scenes_made(conditions, study, (name, || room(air)), of_scene)
 }
 
-/// The same with any other scene in the room's place.
+/// Does what [`over_scenes`] does, with any scene in place of the room.
 fn over_scenes_made(
     conditions: &Conditions<'_>,
     study: Study,
@@ -111,7 +129,7 @@ fn over_scenes_made(
     Ok(measured)
 }
 
-/// The studies of these names, in the order of the page; all without a name.
+/// Returns the studies with these names in the order of the page, or all studies if there are no names.
 ///
 /// # Errors
 /// [`CostError::UnknownStudy`].

@@ -1,5 +1,5 @@
-//! Frames of f32 against rays of f64 over cases that are hard for arithmetic: what the equations lose where every operation is rounded to f16 or f32, and what is lost when
-//! the frame is kept in fewer bits.
+//! Study of the precision of f32 frames in cases that are hard for arithmetic, compared with rays in f64; of
+//! the equations with every operation rounded to f16 or f32; and of frames stored in fewer bits.
 
 use std::time::Instant;
 
@@ -20,7 +20,7 @@ use crate::scenes::{Sheet, sheet};
 use crate::traced::lighting_of;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
-/// What is hard, and about what.
+/// The cases with their names.
 const CASES: [(&str, Sheet); 7] = [
     ("plain", Sheet::PLAIN),
     ("exponent 50000", Sheet { shininess: 50_000.0, ..Sheet::PLAIN }),
@@ -37,14 +37,17 @@ const EIGHT: &str = "the frame kept in eight bits";
 const F64: &str = "f64 rays";
 const LOST: &str = "pixels without a number, %";
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
     let mut measured = Measured { study: study(), ..Measured::default() };
     if !conditions.files.is_empty() {
-        measured.study.notes.push("The given files were not looked at: this study is of one sheet.".into());
+        measured
+            .study
+            .notes
+            .push("The scene files were not used: this study always measures a sheet.".into());
     }
     let mut frames = Vec::new();
     let mut scenes = Vec::new();
@@ -78,7 +81,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
             "lumbre trace {} -o picture.exr --size {size} --depth 0 --no-shadows",
             scene.in_commands()
         );
-        // What becomes of a frame when it is kept in fewer bits has no command of its own.
+        // No command stores a frame in fewer bits.
         let kept = [
             (F32, frame.picture.clone(), draw),
             (F16, in_halves(&frame.picture), conditions.again("precision")),
@@ -92,7 +95,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         for format in FORMATS {
             let mut world = scene.open(conditions.aspect())?;
             let Some(rounded) = rounded_lighting(&mut world, conditions.size, format) else { continue };
-            // Rounded by a program after each operation: that has no time of a device.
+            // The equations are evaluated and rounded on the CPU, so there is no time of a device.
             let mut point = point(format.name, None, conditions.again("precision"));
             point.figures.insert(LOST.into(), 100.0 * rounded.lost);
             measured.add_picture(point, rounded.picture, &reference, ErrorOver::Picture)?;
@@ -106,18 +109,18 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
 fn study() -> Study {
     Study {
         name: "precision".into(),
-        title: "f32 on the device against f64".into(),
-        question: "A sheet that fills the frame, under light that is hard for arithmetic: what do frames of 32 bits lose, and what do 16 and eight after them? What would plain equations lose in 16 bits and in 32, and what would 64 cost, by rays?".into(),
+        title: "f32 on the device, compared with f64".into(),
+        question: "A sheet that fills the frame is lit in ways that are hard for arithmetic. What do frames in 32 bits lose, and what is lost by storing them in 16 or eight? What would plain equations lose in 16 and in 32 bits, and what would 64 bits cost, by tracing rays?".into(),
         reference: "the same lighting equation at the same pixels, traced in f64".into(),
         plots: vec![Plot {
-            title: "Error against time".into(),
+            title: "Error over time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
             front: true,
             ..Plot::default()
         }],
         notes: vec![
-            "The equations of f16 and f32 are rounded after every operation, without what the renderer does about hard cases; the point that is lit and the camera are relative to the eye. Pixels for which the format has no number are black."
+            "The equations in f16 and f32 are rounded after every operation, without the renderer's measures for hard cases; positions are relative to the eye. Pixels for which the format has no finite number are black."
                 .into(),
         ],
         ..Study::default()
@@ -133,12 +136,12 @@ fn in_halves(picture: &Picture) -> Picture {
     each_channel(picture, |value| f64::from(f16::from_f64(value)))
 }
 
-/// Through sRGB's encoding, as a screen has it, without a tone curve.
+/// Rounds to eight bits in sRGB encoding, as for a screen, without a tone curve.
 fn in_bytes(picture: &Picture) -> Picture {
     each_channel(picture, |value| decode_srgb((255.0 * encode_srgb(value.clamp(0.0, 1.0))).round() / 255.0))
 }
 
-/// What plain equations lose, in the shorter format and beside the device's frames.
+/// Reports what plain equations lose in f16, and in f32 compared with the device's frames.
 fn of_equations(study: &Study) -> Vec<String> {
     let error = |point: &Point| point.error.map_or(0.0, |error| error.relative_rmse);
     let [short, long] = FORMATS.map(|format| study.of_series(format.name).collect::<Vec<_>>());
@@ -148,11 +151,12 @@ fn of_equations(study: &Study) -> Vec<String> {
         let lost: Vec<&str> = short.iter().filter(is_lost).map(|point| point.label.as_str()).collect();
         let none = if lost.is_empty() { "none".into() } else { listed(&lost, "and") };
         findings.push(format!(
-            "Equations in f16 are off by {} where nothing is hard; cases with pixels for which f16 has no number: {none}.",
+            "The error of the equations in f16 is {} in the easy case; cases with pixels for which f16 has no finite number: {none}.",
             percent(error(plain))
         ));
     }
-    // Where the device's f32 is most of all better than plain f32: what going round the hard places gains.
+    // The case in which the device's frame is better than plain f32 by the largest factor shows what avoiding
+    // the hard cases gains.
     let gained = long.iter().filter_map(|point| {
         let frame = study.of_series(F32).find(|frame| frame.label == point.label)?;
         Some((point, frame, error(point) / error(frame).max(1e-12)))
@@ -161,7 +165,7 @@ fn of_equations(study: &Study) -> Vec<String> {
         gained.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|(.., gain)| *gain > 1.0)
     {
         findings.push(format!(
-            "Plain equations in f32 lose most beside the frame at \"{}\": {} where the frame is off by {}, {} times as much.",
+            "The case in which the frame is better than plain equations in f32 by the largest factor is \"{}\": the error of the equations is {}, that of the frame {}, a factor of {}.",
             plain.label,
             percent(error(plain)),
             percent(error(frame)),
@@ -178,7 +182,7 @@ fn findings(study: &Study) -> Vec<String> {
     let plain = study.of_series(F32).find(|point| point.label == CASES[0].0);
     if let (Some(hardest), Some(plain)) = (hardest, plain) {
         findings.push(format!(
-            "Of the f32 frames the farthest off is \"{}\", by {}; \"{}\" is off by {}.",
+            "The f32 frame with the largest error is \"{}\", with {}; that of \"{}\" is {}.",
             hardest.label,
             percent(error(&hardest)),
             plain.label,
@@ -194,9 +198,12 @@ fn findings(study: &Study) -> Vec<String> {
         .map(|(frame, _)| frame.label.as_str())
         .collect();
     findings.push(match worse.is_empty() {
-        true => "In every case eight bits lose more than twice as much as f32.".to_owned(),
+        true => "In every case storing in eight bits loses more than twice as much as f32.".to_owned(),
         false => {
-            format!("Arithmetic loses as much as eight bits, or half of it, in {}.", listed(&worse, "and"))
+            format!(
+                "Cases in which f32 loses at least half as much as storing in eight bits: {}.",
+                listed(&worse, "and")
+            )
         }
     });
     let times = study.of_series(F32).zip(study.of_series(F64));
@@ -206,7 +213,7 @@ fn findings(study: &Study) -> Vec<String> {
     let apart = pairs.iter().filter(|(frame, rays)| frame.is_below(rays)).count();
     if let (Some(factor), Some((frame, _))) = (Spread::of(&factors), pairs.first()) {
         findings.push(format!(
-            "Rays in f64 take longer than the frame in {apart} of {} cases, as far as the rounds tell: {} times as long in the median ({} to {}; a frame: {}).",
+            "Rays in f64 take distinguishably longer than the frame in {apart} of {} cases: {} times as long in the median ({} to {}; a frame takes {}).",
             pairs.len(),
             rounded(factor.median),
             rounded(factor.lower),

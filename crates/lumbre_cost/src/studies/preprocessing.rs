@@ -1,5 +1,6 @@
-//! Light that bounces, before the game or in it: what it costs a frame when it was baked, what baking takes, and what it takes again when something of the
-//! level has moved. Not how good a bake of which price is: that is `bake`.
+//! Study of interreflected light, which is computed before the game: what it costs a frame, how long a bake
+//! takes, and how long it takes again after something in the level has moved. The relation between a bake's
+//! time and its error is studied in `bake`.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
@@ -28,13 +29,13 @@ use crate::scenes::{Air, two_rooms};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 const SECONDS: f64 = 4.0;
-/// What moves goes by this part of its longest side.
+/// Distance by which an object moves, as a fraction of its longest side.
 const STEP: f64 = 0.1;
 const FRAME: &str = "frame";
 const BAKE: &str = "bake after a change";
 const BEFORE: &str = "baked before, ms";
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -47,11 +48,11 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
 fn study() -> Study {
     Study {
         name: "preprocessing".into(),
-        title: "Before the game, or in it".into(),
-        question: "Light that bounces is baked once and read in every frame: what does a frame pay for it, what does the bake take, and what does it take again when something has moved?".into(),
-        reference: "frames: the frame with lightmaps of a converged bake; bakes after a change: a converged bake of the changed level, whose own noise is taken off".into(),
+        title: "Interreflected light, baked before the game".into(),
+        question: "Interreflected light is baked once and read in every frame. What does it cost a frame, how long does the bake take, and how long does it take again when something has moved?".into(),
+        reference: "for frames, the frame with the lightmaps of a converged bake; for bakes after a change, a converged bake of the changed level, whose own noise is subtracted".into(),
         plots: vec![Plot {
-            title: "Error against time".into(),
+            title: "Error over time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
             front: true,
@@ -74,7 +75,7 @@ fn of_scene(
     let part = |share: f64| before + share * (after - before);
     let options = options_of(conditions, scene, 1.0)?;
     let options = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..options };
-    // Of what is asked for, `error` alone does not matter to it.
+    // The converged bake does not depend on the requested error.
     let options_of_truth = converged(conditions, &options, conditions.reference_time(8.0, REFERENCE_SECONDS));
     let (baked, _) =
         bake_world(conditions, scene.open(conditions.aspect())?, &options, None, [part(0.0), part(0.1)])?;
@@ -86,7 +87,7 @@ fn of_scene(
     measured.study.findings.extend(findings);
     match conditions.files.is_empty() {
         true => {
-            // In one room hardly any light stays as it was, whatever moves.
+            // In a single room hardly any light stays the same, whatever moves.
             let rooms = SceneFile::made(conditions, "two-rooms", two_rooms())?;
             let options = options_of(conditions, &rooms, 2.0)?;
             after_a_change(conditions, &rooms, &options, [part(0.5), part(1.0)], measured)
@@ -98,13 +99,14 @@ fn of_scene(
     }
 }
 
-/// What bakes are asked for, of a level that is so many times as large as one room. With a larger error hardly any rays would be cast that a former bake could spare.
+/// Returns the options of bakes for a level that is this many times as large as one room. With a larger error
+/// there would hardly be any rays that reusing a former bake could save.
 fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Result<BakeOptions, CostError> {
     let texels = rooms * conditions.unless_quick(4_000.0, 700.0);
     Ok(BakeOptions { error: ERROR, ..bake_options(conditions, scene, texels)? })
 }
 
-/// Moves something of a scene, and bakes it whole and from what a former bake has kept.
+/// Moves an object of a scene, and bakes the scene from scratch and by reusing a former bake.
 fn after_a_change(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
@@ -115,13 +117,16 @@ fn after_a_change(
     let part = |share: f64| before + share * (after - before);
     let open = || scene.open(conditions.aspect());
     let Some(moved) = moved(&mut open()?) else {
-        let note = format!("Nothing of {} could be moved: all of it shines or moves already.", scene.name);
+        let note = format!("Nothing in {} could be moved: everything shines or moves already.", scene.name);
         measured.study.notes.push(note);
         return Ok(());
     };
     let (_, samples) = bake_world(conditions, open()?, options, None, [part(0.0), part(0.1)])?;
     let Some(samples) = samples else {
-        measured.study.notes.push(format!("The bake of {} left no samples to keep.", scene.name));
+        measured
+            .study
+            .notes
+            .push(format!("The bake of {} left no samples that could be reused.", scene.name));
         return Ok(());
     };
     let changed = || -> Result<World, CostError> {
@@ -146,7 +151,7 @@ fn after_a_change(
     })?;
     let whole_for = done.last().and_then(|of_change| of_change.made.report.rebake.as_ref());
     if let Some(why) = whole_for.map(|rebake| &rebake.whole).filter(|why| !why.is_empty()) {
-        measured.study.notes.push(format!("Of {} nothing was kept: {why}.", scene.name));
+        measured.study.notes.push(format!("No samples of {} were reused: {why}.", scene.name));
     }
     let labels = [format!("whole, {moved} moved"), format!("what {moved} changed")];
     for (Repeated { times, made: mut baked }, label) in done.into_iter().zip(labels) {
@@ -173,7 +178,8 @@ fn after_a_change(
     Ok(())
 }
 
-/// Three frames: by lamps alone, with the constant ambient light that comes nearest to the reference, and with lightmaps.
+/// Measures three frames: with lamps only, with the constant ambient light that comes closest to the
+/// reference, and with lightmaps.
 fn frames(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
@@ -208,7 +214,7 @@ fn frames(
                 conditions.drawing("baked.glb", "")
             ),
             false if label == labels[0] => conditions.drawing(scene.in_commands(), ""),
-            // A file's ambient light cannot be told to `lumbre render`.
+            // `lumbre render` has no option for ambient light.
             false => conditions.again("preprocessing"),
         };
         let mut point = Point {
@@ -227,8 +233,9 @@ fn frames(
     Ok(drawn)
 }
 
-/// The ambient light, per channel, with which the frame comes nearest to the reference: light is linear, so that this is the least squares of one number,
-/// from a frame without and one under ambient light of 1.
+/// Returns the ambient light, per channel, with which the frame comes closest to the reference. Light is
+/// linear, so this is a least-squares fit of one number, from a frame without ambient light and one with
+/// ambient light of 1.
 fn best_ambient(alone: &Picture, under_one: &Picture, reference: &Picture) -> Vec3 {
     let (mut products, mut squares) = (DVec3::ZERO, DVec3::ZERO);
     for ((alone, lit), wanted) in alone.radiance.iter().zip(&under_one.radiance).zip(&reference.radiance) {
@@ -239,7 +246,8 @@ fn best_ambient(alone: &Picture, under_one: &Picture, reference: &Picture) -> Ve
     (products / squares.max(DVec3::splat(f64::MIN_POSITIVE))).max(DVec3::ZERO).as_vec3()
 }
 
-/// Moves the smallest static object that does not shine, along x, by a part of its longest side; its name, or nothing where there is none.
+/// Moves the smallest static object that does not shine along x by a fraction of its longest side, and
+/// returns its name, or `None` if there is none.
 fn moved(world: &mut World) -> Option<String> {
     let hidden = hidden_entities(world);
     let mut objects = world.query_filtered::<(Entity, &Mesh, &GlobalTransform, &Material), (With<StaticObject>, With<Transform>, Without<EmissiveLight>)>();
@@ -256,7 +264,7 @@ fn moved(world: &mut World) -> Option<String> {
         .filter(|(_, side)| side.is_finite() && *side > 0.0);
     let (entity, side) = candidates.min_by(|a, b| a.1.total_cmp(&b.1))?;
     world.get_mut::<Transform>(entity)?.translation.x += STEP * side;
-    // A primitive's name is that of its node.
+    // The name of a primitive is that of its node.
     let above = |entity: &Entity| world.get::<ChildOf>(*entity).map(ChildOf::parent);
     let named = |entity: Entity| world.get::<Name>(entity).map(|name| name.as_str().to_owned());
     let name = std::iter::successors(Some(entity), above).filter_map(named).find(|name| !name.is_empty());
@@ -268,7 +276,7 @@ fn findings_of_frames(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Ve
     let errors = [alone, ambient, lightmaps]
         .map(|point| point.error.map_or_else(String::new, |error| error_of(&error)));
     let mut findings = vec![format!(
-        "Without light that bounces, frames of the {scene} are off by {}; the best constant ambient light leaves {}, lightmaps {}.",
+        "Without interreflected light, the error of frames of the {scene} is {}; with the best constant ambient light it is {}, with lightmaps {}.",
         errors[0], errors[1], errors[2]
     )];
     if let Some((alone, lit)) = drawn.first().zip(drawn.last())
@@ -278,7 +286,7 @@ fn findings_of_frames(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Ve
         let [before, after] =
             [alone, lit].map(|frame| rounded(f64::from(frame.statistics.lights_per_object)));
         findings.push(format!(
-            "With lightmaps a frame takes {} of its time without them, and an object in view has {after} lights in its list in place of {before}, on average; the lightmaps take {} s once, as long as {} such frames ({}).",
+            "With lightmaps a frame takes {} times as long as without them, and an object in view has {after} lights in its list instead of {before}, on average. Baking the lightmaps takes {} s once, as long as {} such frames ({}).",
             factor(&ratio),
             rounded(1e-3 * bake),
             rounded(bake / time.median.max(1e-9)),
@@ -294,7 +302,7 @@ fn finding_of_change(scene: &str, moved: &str, points: &[Point]) -> Option<Strin
     let error =
         |point: &Point| point.error.map_or_else(|| "an unknown error".to_owned(), |error| error_of(&error));
     Some(format!(
-        "After \"{moved}\" of the {scene} has moved, baking what has changed takes {}, beside a whole bake, and {} of its rays, with {} of error beside {}.",
+        "After \"{moved}\" in the {scene} has moved, baking only what has changed takes {}, compared with a full bake, and {} of its rays. The error is {}, that of the full bake {}.",
         times_of(&changed.milliseconds?, &all.milliseconds?),
         rounded(rays(changed) / rays(all).max(1.0)),
         error(changed),
@@ -317,7 +325,7 @@ mod tests {
         let planted = DVec3::new(0.25, 0.0625, 9.0);
         let found =
             best_ambient(&picture(alone.clone()), &picture(under(DVec3::ONE)), &picture(under(planted)));
-        // Nothing is told of a channel in which nothing reflects.
+        // A channel in which nothing is reflected remains 0.
         assert!((found.as_dvec3() - DVec3::new(0.25, 0.0625, 0.0)).length() < 1e-6, "{found}");
     }
 }

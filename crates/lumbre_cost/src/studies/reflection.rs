@@ -1,4 +1,5 @@
-//! Reflection models beside Phong's: how far their highlights are from his over exponents and angles of incidence, and what they cost.
+//! Study of reflection models compared with Phong's: how far their highlights differ over exponents and
+//! angles of incidence, and what they cost.
 
 use glam::{DVec3, Vec3};
 use lumbre_optics::{Lobe, ReflectionModel, Surface, SurfaceSample, specular_reflection};
@@ -15,15 +16,16 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Stu
 const EXPONENTS: &[f32] = &[4.0, 16.0, 64.0, 256.0];
 const FEW_EXPONENTS: &[f32] = &[8.0, 64.0];
 const EXPONENT: &str = "exponent";
-/// What is measured: each model with the documents' bare lobe, and Blinn's with one that keeps its energy.
+/// Returns what is measured: each model with the documents' bare lobe, and Blinn's with an energy-conserving
+/// one.
 fn variants() -> Vec<Variant> {
     let bare = |&model| Variant { model, lobe: Lobe::Bare };
-    let keeping = Variant { model: ReflectionModel::Blinn, lobe: Lobe::EnergyKeeping };
+    let conserving = Variant { model: ReflectionModel::Blinn, lobe: Lobe::EnergyConserving };
     // Phong's is the first: all others are compared with it.
-    ReflectionModel::ALL.iter().map(bare).chain([keeping]).collect()
+    ReflectionModel::ALL.iter().map(bare).chain([conserving]).collect()
 }
 
-/// A reflection model, and what its highlight's brightness means.
+/// A reflection model, and how its specular coefficient is interpreted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Variant {
     model: ReflectionModel,
@@ -32,18 +34,18 @@ struct Variant {
 
 /// Angles between light and normal, in degrees.
 const INCIDENCES: [f64; 4] = [0.0, 30.0, 60.0, 80.0];
-/// Fine enough for its facets not to be seen.
+/// Subdivision depth, fine enough to hide the facets.
 const DEPTH: u32 = 6;
 const SECONDS: f64 = 8.0;
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
     let mut measured = Measured { study: study(), ..Measured::default() };
     if !conditions.files.is_empty() {
-        measured.study.notes.push("The given files were not looked at: this study is of one ball.".into());
+        measured.study.notes.push("The scene files were not used: this study always measures a ball.".into());
     }
     let exponents = conditions.unless_quick(EXPONENTS, FEW_EXPONENTS);
     let variants = variants();
@@ -55,8 +57,9 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
             SceneFile::made(conditions, &name, ball(asked))
         };
         let bare = made(Lobe::Bare, format!("ball-exponent-{shininess}"))?;
-        let keeping = made(Lobe::EnergyKeeping, format!("ball-exponent-{shininess}-energy-keeping"))?;
-        let of = |variant: &Variant| if variant.lobe == Lobe::Bare { bare.clone() } else { keeping.clone() };
+        let conserving = made(Lobe::EnergyConserving, format!("ball-exponent-{shininess}-energy-keeping"))?;
+        let of =
+            |variant: &Variant| if variant.lobe == Lobe::Bare { bare.clone() } else { conserving.clone() };
         let own: Vec<SceneFile> = variants.iter().map(of).collect();
         for (variant, scene) in variants.iter().zip(&own) {
             let options = FrameOptions { reflection: Some(variant.model), ..FrameOptions::default() };
@@ -80,12 +83,12 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
 fn study() -> Study {
     Study {
         name: "reflection".into(),
-        title: "Reflection models beside Phong's".into(),
-        question: "Blinn's half vector with the exponent as it is, with four times it, fitted to it, or keeping its energy, and Torrance and Sparrow's facets: how far are their highlights from Phong's, and do they cost more, as document [M] says of Blinn's?".into(),
+        title: "Reflection models compared with Phong's".into(),
+        question: "Blinn's half vector with Phong's exponent, with four times that exponent, with a matched exponent or with an energy-conserving lobe, and the microfacets of Torrance and Sparrow: how much do their highlights differ from Phong's, and do they cost more, as document [M] says of Blinn's?".into(),
         reference: "the same ball under Phong's model with the same exponent".into(),
         plots: vec![
             Plot {
-                title: "How far from Phong's highlight".into(),
+                title: "Difference from Phong's highlight".into(),
                 across: Quantity::Parameter(EXPONENT.into()),
                 up: Quantity::Error,
                 joined: true,
@@ -105,7 +108,7 @@ fn study() -> Study {
 
 fn name_of(variant: Variant) -> &'static str {
     match variant.model {
-        _ if variant.lobe == Lobe::EnergyKeeping => "Blinn, energy-keeping",
+        _ if variant.lobe == Lobe::EnergyConserving => "Blinn, energy-keeping",
         ReflectionModel::Phong => "Phong",
         ReflectionModel::Blinn => "Blinn, n",
         ReflectionModel::Blinn4n => "Blinn, 4n",
@@ -137,7 +140,8 @@ fn point(
     }
 }
 
-/// Root mean square difference of a model's highlight from Phong's over that of Phong's, over the directions of view above a surface, in f64.
+/// Returns the root mean square difference of a model's highlight from Phong's, divided by that of Phong's,
+/// over the viewing directions above a surface, in f64.
 fn lobes_apart(variant: Variant, shininess: f32, incidence: f64) -> f64 {
     const STEPS: u32 = 90;
     let surface = Surface { specular: Vec3::ONE, shininess, ..Surface::default() };
@@ -153,7 +157,7 @@ fn lobes_apart(variant: Variant, shininess: f32, incidence: f64) -> f64 {
             let viewer = DVec3::new(sine * around.cos(), cosine, sine * around.sin());
             let highlight = |model, surface| specular_reflection(model, surface, DVec3::Y, light, viewer).x;
             let phong = highlight(ReflectionModel::Phong, &bare);
-            // The sine is the share of the hemisphere that a step of elevation has.
+            // The sine is proportional to the solid angle of a step of elevation.
             squares += sine * (highlight(variant.model, &own) - phong).powi(2);
             of_phong += sine * phong.powi(2);
         }
@@ -167,7 +171,7 @@ fn findings(study: &Study, drawn: &[DrawnFrame]) -> Vec<String> {
     let mut nearest: Option<(&str, f64)> = None;
     for (place, &variant) in variants.iter().enumerate().skip(1) {
         let name = name_of(variant);
-        // Over all exponents: pairs of the same rounds.
+        // Pairs of times from the same round, for all exponents.
         let pairs = drawn.chunks(variants.len()).flat_map(|all| all[place].times.iter().zip(&all[0].times));
         let ratios: Vec<f64> = pairs.map(|(time, of_phong)| time / of_phong.max(1e-9)).collect();
         if let Some(ratio) = Spread::of_median(&ratios) {
@@ -182,7 +186,7 @@ fn findings(study: &Study, drawn: &[DrawnFrame]) -> Vec<String> {
     let mut findings = vec![format!("{}.", costs.join("; "))];
     if let Some((name, error)) = nearest {
         findings.push(format!(
-            "The nearest to Phong's pictures over all exponents is {name}, {} off at most.",
+            "The model closest to Phong's pictures over all exponents is {name}, with an error of {} at most.",
             percent(error)
         ));
     }

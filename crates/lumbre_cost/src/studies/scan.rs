@@ -1,5 +1,5 @@
-//! Flat, Gouraud and Phong shading on a scan at several resolutions: a mesh that something was measured with, from all of its triangles to a few. Not the spheres of the study of
-//! shading, whose exact surface is known.
+//! Study of flat, Gouraud and Phong shading on a scan at several resolutions, from few triangles to all of
+//! them. The study `shading` measures spheres, whose exact surface is known.
 
 use std::sync::Arc;
 
@@ -20,15 +20,15 @@ use crate::scenes::scan;
 use crate::traced::lighting_of;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 
-/// Cells of the grid along the longest side, the coarsest first; the whole scan comes after them.
+/// Numbers of grid cells along the longest side, the coarsest first; the full scan comes after them.
 const CELLS: &[u32] = &[6, 10, 16, 26, 42, 68, 110];
 const FEW_CELLS: &[u32] = &[10, 26, 68];
-/// A mesh with fewer triangles is not measured at several resolutions.
-const LEAST_TRIANGLES: usize = 2_000;
+/// Meshes with fewer triangles are not simplified.
+const MIN_TRIANGLES: usize = 2_000;
 const SECONDS: f64 = 9.0;
 const RESOLUTION: &str = "cells along the longest side";
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -42,11 +42,11 @@ fn study() -> Study {
     Study {
         name: "scan".into(),
         title: "Shading a scan at several resolutions".into(),
-        question: "A scan has more triangles than its shape wants: with how many of them does which shading reach which error, and in which time?".into(),
-        reference: "the scan with all of its triangles, the lighting equation traced in f64 at every pixel; what fewer triangles do to its shape counts as error, too".into(),
+        question: "A scan has more triangles than its shape requires. Which error does each shading reach with how many of them, and in which time?".into(),
+        reference: "the scan with all of its triangles, traced in f64 with the same lighting equation at every pixel; the error includes the change of shape by simplification".into(),
         plots: vec![
             Plot {
-                title: "Error against time".into(),
+                title: "Error over time".into(),
                 across: Quantity::Milliseconds,
                 up: Quantity::Error,
                 joined: true,
@@ -54,7 +54,7 @@ fn study() -> Study {
                 ..Plot::default()
             },
             Plot {
-                title: "Error against the mesh".into(),
+                title: "Error over the mesh".into(),
                 across: Quantity::Count("triangles".into()),
                 up: Quantity::Error,
                 joined: true,
@@ -73,9 +73,9 @@ fn of_scene(
     measured: &mut Measured,
 ) -> Result<(), CostError> {
     let mut whole = scene.open(conditions.aspect())?;
-    if largest_mesh(&mut whole) < LEAST_TRIANGLES {
+    if largest_mesh(&mut whole) < MIN_TRIANGLES {
         measured.study.notes.push(format!(
-            "{}: no mesh without textures has {LEAST_TRIANGLES} triangles, so that there is no scan to measure.",
+            "{}: no mesh without textures has {MIN_TRIANGLES} triangles, so there is no scan to measure.",
             scene.name
         ));
         return Ok(());
@@ -136,19 +136,19 @@ fn point(
     }
 }
 
-/// Meshes that nothing but their shape tells of, with their triangles.
+/// Meshes whose appearance depends only on their shape.
 type Plain = (Without<MaterialTextures>, Without<Lightmap>);
 
-/// Triangles of the largest mesh that can be made coarser.
+/// Returns the number of triangles of the largest mesh that can be simplified.
 fn largest_mesh(world: &mut World) -> usize {
     let mut meshes = world.query_filtered::<&Mesh, Plain>();
     meshes.iter(world).map(|mesh| mesh.0.triangle_count()).max().unwrap_or(0)
 }
 
-/// Replaces what looks like a scan by fewer triangles; what is not sound stays, as it does in a frame.
+/// Simplifies the meshes that look like scans. Invalid meshes are left as they are.
 fn make_coarser(world: &mut World, cells: u32) {
     let mut meshes = world.query_filtered::<&mut Mesh, Plain>();
-    for mut mesh in meshes.iter_mut(world).filter(|mesh| mesh.0.triangle_count() >= LEAST_TRIANGLES) {
+    for mut mesh in meshes.iter_mut(world).filter(|mesh| mesh.0.triangle_count() >= MIN_TRIANGLES) {
         if let Ok(coarse) = clustered(&mesh.0, cells) {
             mesh.0 = Arc::new(coarse);
         }

@@ -1,5 +1,5 @@
-//! Flat, Gouraud and Phong shading over meshes from coarse to fine, against the exact surface: which of them reaches which error in the least
-//! time.
+//! Study of flat, Gouraud and Phong shading on meshes from coarse to fine, compared with the exact surface:
+//! which of them reaches which error in the least time.
 
 use lumbre_optics::{Lobe, ReflectionModel, Shading};
 use lumbre_render::FrameOptions;
@@ -14,13 +14,13 @@ use crate::scenes::{Ball, ball, exact_ball};
 use crate::traced::lighting_of;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 
-/// Depths of the spheres.
+/// Subdivision depths of the spheres.
 const DEPTHS: std::ops::RangeInclusive<u32> = 0..=7;
 /// Seconds for the frames of a full report.
 const SECONDS: f64 = 14.0;
 const DEPTH: &str = "depth of subdivision";
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -78,7 +78,8 @@ fn given(conditions: &Conditions<'_>) -> Result<Vec<Subject>, CostError> {
     Ok(SceneFile::given(conditions)?.into_iter().map(subject).collect())
 }
 
-/// The name of each subject's reference: one exact sphere for all spheres, a picture of its own for every file.
+/// Returns the name of each subject's reference: one exact sphere for all spheres, and a picture of its own
+/// for every file.
 fn references(
     conditions: &Conditions<'_>,
     subjects: &[Subject],
@@ -98,11 +99,10 @@ fn references(
 }
 
 fn study(whole: bool) -> Study {
-    let sphere = "the exact sphere, traced in f64: the same lighting equation at every pixel; errors over the pixels that show the ball in both";
-    let traced =
-        "the same scene traced in f64 without shadows and mirrors: the same lighting equation at every pixel";
+    let sphere = "the exact sphere, traced in f64 with the same lighting equation at every pixel; errors are computed over the pixels that show the ball in both pictures";
+    let traced = "the same scene, traced in f64 without shadows and mirrors, with the same lighting equation at every pixel";
     let mut plots = vec![Plot {
-        title: "Error against time".into(),
+        title: "Error over time".into(),
         across: Quantity::Milliseconds,
         up: Quantity::Error,
         joined: !whole,
@@ -111,7 +111,7 @@ fn study(whole: bool) -> Study {
     }];
     if !whole {
         plots.push(Plot {
-            title: "Error against the mesh".into(),
+            title: "Error over the mesh".into(),
             across: Quantity::Count("triangles".into()),
             up: Quantity::Error,
             joined: true,
@@ -122,14 +122,14 @@ fn study(whole: bool) -> Study {
     Study {
         name: "shading".into(),
         title: "Flat, Gouraud and Phong shading".into(),
-        question: "The lighting equation once per polygon, once per vertex or once per fragment: which of them reaches which error in the least time, and what does a finer mesh bring?".into(),
+        question: "The lighting equation is evaluated once per polygon, once per vertex or once per fragment. Which of these reaches which error in the least time, and what does a finer mesh gain?".into(),
         reference: if whole { traced } else { sphere }.into(),
         plots,
         ..Study::default()
     }
 }
 
-/// What a series of that shading is called.
+/// Returns the name of the series for a shading.
 pub(super) fn series_of(shading: Shading) -> &'static str {
     match shading {
         Shading::Flat => "flat",
@@ -153,7 +153,7 @@ fn point(conditions: &Conditions<'_>, subject: &Subject, shading: Shading, frame
     }
 }
 
-/// What no shading mends: pixels that show the ball in one of the two pictures alone.
+/// Notes the error that no shading can remove: pixels that show the ball in only one of the two pictures.
 fn add_silhouettes(measured: &mut Measured) {
     let lit = |picture: &Picture| -> Vec<bool> {
         picture.radiance.iter().map(|pixel| pixel.max_element() > 0.0).collect()
@@ -179,14 +179,14 @@ fn findings(study: &Study, drawn: &[DrawnFrame], whole: bool) -> Vec<String> {
         return findings;
     }
     findings.extend(cheapest_by_error(&points, ""));
-    // Where the two are most alike in error: the finest mesh.
+    // The errors are most alike on the finest mesh.
     if let Some((three, times)) = study.points.chunks(3).zip(drawn.chunks(3)).next_back() {
         findings.extend(of_one_mesh(three, times));
     }
     findings
 }
 
-/// Gouraud beside Phong on one mesh.
+/// Compares Gouraud shading with Phong shading on one mesh.
 pub(super) fn of_one_mesh(three: &[Point], times: &[DrawnFrame]) -> Option<String> {
     let ([_, gouraud, phong], [_, per_vertex, per_fragment]) = (three, times) else { return None };
     let ratio = ratio_of(&per_vertex.times, &per_fragment.times)?;

@@ -1,5 +1,5 @@
-//! Shading by need over the error that it is allowed: how many objects take less than Phong shading, what that spares, and how far the picture is then. Not the bounds
-//! themselves: those are the renderer's.
+//! Study of shading by need over the allowed error: how many objects are drawn without Phong shading, how
+//! much time this saves, and how large the error is. The bounds themselves are computed by the renderer.
 
 use lumbre_optics::{ErrorBound, Shading};
 use lumbre_render::{FrameOptions, ShadingNeeds};
@@ -13,14 +13,14 @@ use crate::scene_file::SceneFile;
 use crate::scenes::assorted_balls;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 
-/// Errors that are allowed, in displayed light from 0 to 1.
+/// Allowed errors, in displayed light between 0 and 1.
 const BOUNDS: &[f32] = &[0.001, 0.003, 0.01, 0.03, 0.1, 0.3];
 const FEW_BOUNDS: &[f32] = &[0.01, 0.1];
 const SECONDS: f64 = 6.0;
 const BOUND: &str = "error allowed";
 const BY_NEED: &str = "by need";
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -34,10 +34,10 @@ fn study() -> Study {
     Study {
         name: "need".into(),
         title: "Shading by need".into(),
-        question: "Each object shaded as rarely as an error allows that is known beforehand: what does it spare, and how far is the picture then?".into(),
-        reference: "the frame with Phong shading throughout; the largest difference is of a pixel and channel".into(),
+        question: "Each object takes the cheapest shading that is known in advance to keep within an error. How much time does this save, and how large is the error of the picture?".into(),
+        reference: "the frame with Phong shading of all objects; the largest difference is that of a single channel of a pixel".into(),
         plots: vec![Plot {
-            title: "Error against time".into(),
+            title: "Error over time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
             front: true,
@@ -113,7 +113,7 @@ fn findings(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Vec<String> 
         let Some(ratio) = ratio_of(&frame.times, &phong.times) else { continue };
         let Some(error) = point.error else { continue };
         findings.push(format!(
-            "Where {} is allowed, {flat} of {all} objects in view of the {scene} are shaded flat and {gouraud} per vertex; the frame takes {} of its time with Phong shading throughout, is off by {}, and by {} in the worst pixel.",
+            "With an allowed error of {}, {flat} of the {all} objects in view of the {scene} have flat and {gouraud} have Gouraud shading. The frame takes {} times as long as with Phong shading of all objects; its error is {}, and {} in the worst pixel.",
             short(*bound),
             factor(&ratio),
             percent(error.relative_rmse),

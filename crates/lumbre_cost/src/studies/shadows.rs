@@ -1,4 +1,5 @@
-//! Shadow maps by their texels and by how they are read, against shadow rays in f64: what sharper edges cost, and what soft ones. Not the maps.
+//! Study of shadow maps by resolution and filter, compared with shadow rays in f64: what sharper and softer
+//! shadows cost.
 
 use bevy_ecs::world::World;
 use lumbre_optics::{Light, LightKind};
@@ -17,21 +18,22 @@ use crate::scenes::fence;
 use crate::traced::{ray_tree, traced_world};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 
-/// Texels beside the usual number, along a side of a map.
+/// Factors on the resolution along each side of a map.
 const RESOLUTIONS: &[f32] = &[0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 const FEW_RESOLUTIONS: &[f32] = &[0.25, 1.0, 4.0];
-/// Of maps that are drawn anew.
+/// Factors for maps that are redrawn in every frame.
 const FEW_ANEW: &[f32] = &[1.0, 4.0];
 const RESOLUTION: &str = "texels a side, times the usual number";
 const WITHOUT: &str = "no shadows";
 const ANEW: &str = "soft, all maps drawn anew";
-/// Lamps without a size that stand for those with one, of all of them together: their shadows end in steps of one of them.
+/// Total number of lamps without a size that replace those with a size. The error of the shadows is one step
+/// of one of these lamps.
 const PIECES: u32 = 256;
 const SECONDS: f64 = 9.0;
-/// Of a file whose lamps ask for no shadows, so many do for the study.
-const MADE_TO_ASK: usize = 3;
+/// Number of lamps that get a shadow for the study if no lamp of a file asks for one.
+const MAX_ADDED_SHADOWS: usize = 3;
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -45,11 +47,11 @@ fn study() -> Study {
     Study {
         name: "shadows".into(),
         title: "Shadows".into(),
-        question: "Shadow maps with more or fewer texels, read at one texel, at nine, or at as many as the lamp's size asks for: how far are they from rays, and what does each cost, where maps are kept and where all of them are drawn anew?".into(),
-        reference: "the same lighting equation with shadow rays in f64; a lamp that has a size as many small ones".into(),
+        question: "Shadow maps have more or fewer texels and are read at one texel, at nine, or at as many as the lamp's size requires. How large are their errors compared with rays, and what does each of them cost, if maps are reused and if all of them are redrawn?".into(),
+        reference: "the same lighting equation with shadow rays in f64, with many small lamps in place of each lamp that has a size".into(),
         plots: vec![
             Plot {
-                title: "Error against time".into(),
+                title: "Error over time".into(),
                 across: Quantity::Milliseconds,
                 up: Quantity::Error,
                 joined: true,
@@ -57,7 +59,7 @@ fn study() -> Study {
                 ..Plot::default()
             },
             Plot {
-                title: "Error against the texels of the maps".into(),
+                title: "Error over the texels of the maps".into(),
                 across: Quantity::Parameter(RESOLUTION.into()),
                 up: Quantity::Error,
                 series: ShadowFilter::ALL.iter().map(|filter| filter.name().to_owned()).collect(),
@@ -70,12 +72,12 @@ fn study() -> Study {
     }
 }
 
-/// A frame that is measured.
+/// A frame to be measured.
 #[derive(Clone, Copy)]
 struct Asked {
     settings: FrameSettings,
     shadows: bool,
-    /// Every lamp moves by a hair before each frame, so that no map is as it was.
+    /// Whether every lamp moves slightly before each frame, so that no shadow map can be reused.
     moving: bool,
 }
 
@@ -107,7 +109,7 @@ fn of_scene(
     let mut world = scene.open(conditions.aspect())?;
     let lamps = shadowed_lamps(&mut world);
     if lamps == 0 {
-        measured.study.notes.push(format!("{} has no lamp that could cast a shadow.", scene.name));
+        measured.study.notes.push(format!("{} has no lamp that can cast shadows.", scene.name));
         return Ok(());
     }
     let pieces = (PIECES / lamps).clamp(8, 64);
@@ -134,7 +136,7 @@ fn of_scene(
         measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
     }
     measured.study.notes.push(format!(
-        "The rays of {} took {} of them; {soft} of its {lamps} lamps with shadows have a size.",
+        "The reference of {} took {} rays; {soft} of its {lamps} lamps with shadows have a size.",
         scene.name, report.rays
     ));
     let findings = findings(&scene.name, &all, &measured.study.points[first..], &drawn);
@@ -142,7 +144,7 @@ fn of_scene(
     Ok(())
 }
 
-/// The scene with shadows of its strongest lamps, if none of them asks for one itself.
+/// Returns the scene with shadows for its strongest lamps, if none of them asks for a shadow.
 fn with_shadows(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
@@ -158,13 +160,13 @@ fn with_shadows(
         .filter(|light| light.enabled && light.kind != LightKind::Ambient)
         .collect();
     found.sort_by(|a, b| b.diffuse.element_sum().total_cmp(&a.diffuse.element_sum()));
-    let asking = found.len().min(MADE_TO_ASK);
-    found.iter_mut().take(MADE_TO_ASK).for_each(|light| light.shadow = true);
+    let asking = found.len().min(MAX_ADDED_SHADOWS);
+    found.iter_mut().take(MAX_ADDED_SHADOWS).for_each(|light| light.shadow = true);
     if asking == 0 {
         return Ok(None);
     }
     measured.study.notes.push(format!(
-        "No lamp of {} asks for a shadow: it was measured with shadows of the {asking} strongest.",
+        "No lamp in {} asks for a shadow. It was measured with shadows of its {asking} strongest lamps.",
         scene.name
     ));
     SceneFile::made(conditions, &format!("{}-with-shadows", scene.name), world).map(Some)
@@ -217,7 +219,7 @@ fn findings(scene: &str, all: &[Asked], points: &[Point], drawn: &[DrawnFrame]) 
     };
     if let Some(soft) = usual(ShadowFilter::Soft, 1.0, false) {
         findings.push(format!(
-            "Without shadows frames of the {scene} are off by {}, with soft ones of the usual resolution by {}.",
+            "Without shadows, the error of frames of the {scene} is {}; with soft shadows of the default resolution it is {}.",
             percent(error(0)),
             percent(error(soft))
         ));
@@ -225,7 +227,7 @@ fn findings(scene: &str, all: &[Asked], points: &[Point], drawn: &[DrawnFrame]) 
             let Some(other) = usual(filter, 1.0, false) else { continue };
             let Some(ratio) = ratio_of(&drawn[other].times, &drawn[soft].times) else { continue };
             findings.push(format!(
-                "Read as {} a frame takes {} of the time of soft shadows, and is off by {}.",
+                "With the filter {}, a frame takes {} times as long as with soft shadows, and its error is {}.",
                 filter.name(),
                 factor(&ratio),
                 percent(error(other))
@@ -233,7 +235,7 @@ fn findings(scene: &str, all: &[Asked], points: &[Point], drawn: &[DrawnFrame]) 
         }
     }
     findings.extend(cheapest_by_error(&still, &format!(" of the {scene}")));
-    // What the maps themselves cost, where none is kept.
+    // The cost of drawing the maps themselves, when none is reused.
     let told: Vec<String> = all
         .iter()
         .enumerate()
@@ -247,7 +249,7 @@ fn findings(scene: &str, all: &[Asked], points: &[Point], drawn: &[DrawnFrame]) 
         .collect();
     if !told.is_empty() {
         findings.push(format!(
-            "Where all maps are drawn anew a frame takes so many times as long as where they are kept: {}.",
+            "How many times as long a frame takes if all maps are redrawn instead of reused: {}.",
             told.join(", ")
         ));
     }

@@ -1,5 +1,5 @@
-//! The frames of every camera against the ray tree: how far each is off, and what of all that a frame can do would take most of that away. Not light that bounces: that is
-//! `light_transport`.
+//! Study of the frames of every camera compared with the ray tree: how large their errors are, and which
+//! effect would remove most of it. Interreflected light is studied in `light_transport`.
 
 use bevy_ecs::prelude::*;
 use lumbre_optics::{Light, LightKind, Shading};
@@ -18,16 +18,16 @@ use crate::scenes::mirror_and_glass;
 use crate::traced::{ray_tree, traced_world};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
 
-/// Cameras of a file that are looked through, at most.
-const STOPS: usize = 16;
-const FEW_STOPS: usize = 1;
-/// For the frames of one camera.
+/// Largest number of cameras of a file that are measured.
+const MAX_CAMERAS: usize = 16;
+const FEW_CAMERAS: usize = 1;
+/// Seconds for the frames of one camera.
 const SECONDS: f64 = 4.0;
 
-/// A frame as it is, with more, or with less.
+/// A frame with its own settings, or with more or fewer effects.
 struct Change {
     name: &'static str,
-    /// How it is asked for on the command line.
+    /// The arguments of `lumbre render` for it.
     arguments: &'static str,
     apply: fn(&mut World, &mut FrameOptions),
 }
@@ -74,7 +74,7 @@ fn every_lamp_casts(world: &mut World) {
     lamps.for_each(|mut light| light.shadow = true);
 }
 
-/// Measures it.
+/// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
@@ -87,11 +87,11 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
 fn study() -> Study {
     Study {
         name: "tour".into(),
-        title: "The tour".into(),
-        question: "Frame by frame through a scene's cameras: how far is each from the ray tree, with its shadows, mirrors and glass, and which effect would take most of that away, at what price?".into(),
-        reference: "the documents' ray tree, one ray through the middle of every pixel".into(),
+        title: "Tour of the cameras".into(),
+        question: "How large are the errors of the frames of a scene's cameras compared with the ray tree, which has shadows, mirrors and glass? Which effect would remove most of each error, and at what cost?".into(),
+        reference: "the documents' ray tree, with one ray through the centre of every pixel".into(),
         plots: vec![Plot {
-            title: "Error against time".into(),
+            title: "Error over time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
             front: true,
@@ -101,7 +101,7 @@ fn study() -> Study {
     }
 }
 
-/// The cameras of a scene, by name, or by their place where they have none.
+/// Returns the cameras of a scene with their names, or with their numbers if they have none.
 fn cameras(world: &mut World) -> Vec<(Entity, String)> {
     let mut found: Vec<_> = world
         .query_filtered::<(Entity, Option<&Name>), With<Camera>>()
@@ -123,10 +123,10 @@ fn of_scene(
 ) -> Result<(), CostError> {
     let all = cameras(&mut scene.open(conditions.aspect())?);
     let stops: Vec<String> = all.into_iter().map(|(_, name)| name).collect();
-    let most = conditions.unless_quick(STOPS, FEW_STOPS).min(stops.len());
+    let most = conditions.unless_quick(MAX_CAMERAS, FEW_CAMERAS).min(stops.len());
     if most < stops.len() {
         measured.study.notes.push(format!(
-            "{} has {} cameras, of which the first {most} stand here.",
+            "{} has {} cameras, of which the first {most} were measured.",
             scene.name,
             stops.len()
         ));
@@ -144,14 +144,14 @@ fn of_scene(
     let most_often = (1..CHANGES.len()).max_by_key(|change| best[*change]).filter(|change| best[*change] > 0);
     if let Some(change) = most_often {
         measured.study.findings.push(format!(
-            "{} of the cameras looked through ({most}) would gain most by {}.",
+            "The single change that helps most at most cameras ({} of {most}): {}.",
             best[change], CHANGES[change].name
         ));
     }
     Ok(())
 }
 
-/// The frames of one camera.
+/// Measures the frames of one camera.
 fn of_camera(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
@@ -192,7 +192,8 @@ fn of_camera(
     Ok(())
 }
 
-/// What the points of one camera say, in the order of [`CHANGES`], and which single change takes most of the error away.
+/// Returns the finding about one camera, whose points are in the order of [`CHANGES`], and the single change
+/// that removes most of the error.
 fn findings(stop: &str, points: &[Point]) -> (Vec<String>, Option<usize>) {
     let error = |place: usize| points.get(place)?.error.map(|error| error.relative_rmse);
     let time = |place: usize| points.get(place)?.milliseconds;
@@ -206,24 +207,24 @@ fn findings(stop: &str, points: &[Point]) -> (Vec<String>, Option<usize>) {
         (Some(now), Some(then)) => format!(" ({} instead of {})", milliseconds(&then), milliseconds(&now)),
         _ => String::new(),
     };
-    let mut said = format!("{stop}: the frame is off by {}", percent(now));
+    let mut said = format!("{stop}: the frame has an error of {}", percent(now));
     match best {
         Some((place, left)) => {
             said += &format!(
-                "; {} would take most of it away, and leave {}{}",
+                "; the change \"{}\" would remove most of it and leave {}{}",
                 CHANGES[place].name,
                 percent(left),
                 price(place)
             );
         }
-        None => said += "; nothing that a frame can do would take much of it away",
+        None => said += "; no effect of a frame would remove much of it",
     }
     if let Some(left) = error(everything) {
-        said += &format!("; all that it can do leaves {}", percent(left));
+        said += &format!("; all effects together leave {}", percent(left));
     }
     let without = points.iter().position(|point| point.label == WITHOUT);
     if let Some(bare) = without.and_then(error).filter(|bare| *bare > 1.01 * now) {
-        said += &format!("; without what mirrors and glass show it would be off by {}", percent(bare));
+        said += &format!("; without mirrors and glass it would be {}", percent(bare));
     }
     (vec![said + "."], best.map(|(place, _)| place))
 }

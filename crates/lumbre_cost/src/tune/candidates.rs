@@ -1,24 +1,28 @@
-//! The ways to draw a level that are still in the running: what a stage has to measure, and what another way beats. Not the measuring.
+//! The ways to draw a level that may still be chosen: determines what a stage has to measure, and drops what
+//! another way beats.
 
 use super::draw_settings::{Choices, DrawSettings, Stage};
 use crate::{Point, Spread, pareto_front};
 
-/// What is known of the ways to draw a level so far.
+/// What is known so far about the ways to draw a level.
 #[derive(Default)]
 pub(crate) struct Candidates {
     /// The ways.
     pub settings: Vec<DrawSettings>,
     /// A point for each of them.
     pub points: Vec<Point>,
-    /// Those that were measured last, side by side: only their times can be compared.
+    /// The ways of the last measurement. Only their times can be compared, since they are from the same
+    /// rounds.
     latest: Vec<usize>,
 }
 
-/// Ways from which a stage goes on, at most: those that no other one beats, spread evenly over them if there are more.
-const CARRIED_ON: usize = 5;
+/// Largest number of ways that a stage goes on from: those that no other one beats, or an even selection of
+/// them.
+const MAX_CARRIED_ON: usize = 5;
 
 impl Candidates {
-    /// What a stage has to measure: those that are still in the running, and what differs from the best of them in what the stage chooses.
+    /// Returns what a stage has to measure: the ways that may still be chosen, and those that differ from the
+    /// best of them in what the stage chooses.
     pub fn next(&self, stage: Stage, choices: &Choices) -> Vec<DrawSettings> {
         if self.latest.is_empty() {
             let reference = choices.reference();
@@ -30,26 +34,27 @@ impl Candidates {
         let place = |point: &Point| points.iter().position(|other| std::ptr::eq(other, point));
         let front: Vec<usize> = pareto_front(&points).into_iter().filter_map(place).collect();
         let mut ways = running.clone();
-        for from in evenly(&front, CARRIED_ON) {
+        for from in evenly(&front, MAX_CARRIED_ON) {
             for other in stage.others(running[from], choices) {
                 if !ways.contains(&other) {
                     ways.push(other);
                 }
             }
         }
-        // Nothing to choose: what is known is known.
+        // If there is nothing to choose, nothing has to be measured again.
         if ways.len() == running.len() { Vec::new() } else { ways }
     }
 
-    /// Begins to take what was measured side by side: what was measured before cannot be compared with it.
+    /// Begins to take a new measurement, whose times cannot be compared with earlier ones.
     pub fn begin(&mut self) {
         self.latest.clear();
     }
 
-    /// Takes a way's time, and its point if nothing was known of it.
+    /// Takes the time of a way, and its point if the way is new. `point` gets the label of a new way; a way
+    /// without a point is dropped.
     ///
     /// # Errors
-    /// Those of `point`, which is asked for a new way with what it is called; nothing comes of a way without a point.
+    /// Those of `point`.
     pub fn take<E>(
         &mut self,
         way: DrawSettings,
@@ -71,7 +76,7 @@ impl Candidates {
         Ok(())
     }
 
-    /// Those of the last that no other one of them beats.
+    /// Returns those of the last measurement that no other one beats.
     pub fn contenders(&self) -> Vec<usize> {
         let latest: Vec<&Point> = self.latest.iter().map(|&one| &self.points[one]).collect();
         let kept = (0..latest.len()).filter(|&one| !is_beaten(one, &latest));
@@ -79,7 +84,7 @@ impl Candidates {
     }
 }
 
-/// At most so many of them, the first and the last among them.
+/// Returns at most `most` of the indices, evenly spread and including the first and the last.
 fn evenly(all: &[usize], most: usize) -> Vec<usize> {
     let last = all.len().saturating_sub(1);
     match all.len() <= most {
@@ -88,7 +93,7 @@ fn evenly(all: &[usize], most: usize) -> Vec<usize> {
     }
 }
 
-/// Whether another one is as accurate and takes less time, quartiles and all.
+/// Returns true if another way is as accurate and takes less time, with quartiles that do not overlap.
 fn is_beaten(one: usize, points: &[&Point]) -> bool {
     let known = |point: &Point| Some((point.milliseconds?, point.error?.relative_rmse));
     let Some((time, error)) = known(points[one]) else { return true };

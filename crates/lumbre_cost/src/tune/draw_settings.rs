@@ -1,4 +1,4 @@
-//! A way to draw a level, and those that differ from it in one respect. Not their measuring.
+//! The settings with which a level is drawn, and the settings that differ from them in one respect.
 
 use bevy_ecs::prelude::*;
 use lumbre_optics::{ErrorBound, Light, LightKind, Shading};
@@ -7,44 +7,45 @@ use lumbre_scene::{Camera, FrameSettings, SceneSettings, ShadowFilter};
 
 use crate::findings::short;
 
-/// A way to draw a level.
+/// The settings with which a level is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawSettings {
-    /// How often the lighting equation is evaluated, for objects that do not choose for themselves.
+    /// Shading for objects that do not choose their own.
     pub shading: Shading,
-    /// Shadows of lights that ask for them.
+    /// Whether lights that ask for shadows cast them.
     pub shadows: bool,
-    /// How their maps are read.
+    /// Filter of shadow maps.
     pub shadow_filter: ShadowFilter,
-    /// Texels of their maps beside the usual number, along a side.
+    /// Factor on the resolution of shadow maps along each side.
     pub shadow_resolution: f32,
-    /// Radiance on a white surface below which a lamp ends; 0 where lamps end as the level says.
+    /// Radiance on a white surface below which a lamp ends; 0 if lamps end as the level says.
     pub light_threshold: f32,
-    /// Four samples a pixel.
+    /// Whether four samples per pixel are taken.
     pub multisample: bool,
 }
 
-/// What there is in a level to choose about.
+/// What a level leaves to choose.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Choices {
-    /// A light asks for a shadow.
+    /// Whether a light asks for shadows.
     shadows: bool,
-    /// There are lamps that may end, and this is the radiance that is shown as white.
+    /// The radiance that is displayed as white, if there are lamps that may end.
     white: Option<f32>,
 }
 
-/// What is chosen at once, one after another: what they cost has little to do with each other.
+/// What is chosen together. Choices of different stages hardly influence each other's cost, so that stages
+/// follow one another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
-    /// How often light is evaluated, and how often a pixel is.
+    /// How often light is evaluated, and how many samples a pixel has.
     Evaluations,
     Shadows,
     Lamps,
 }
 
-/// Errors that shading by need is tried with.
+/// Errors for shading by need.
 const BOUNDS: [f32; 4] = [0.003, 0.01, 0.03, 0.1];
-/// Shadows that are tried, the most accurate first.
+/// Filters and resolutions of shadow maps, the most accurate first.
 const SHADOWS: [(ShadowFilter, f32); 6] = [
     (ShadowFilter::Soft, 2.0),
     (ShadowFilter::Soft, 1.0),
@@ -53,11 +54,11 @@ const SHADOWS: [(ShadowFilter, f32); 6] = [
     (ShadowFilter::Hard, 1.0),
     (ShadowFilter::Hard, 0.5),
 ];
-/// Parts of white at which lamps are tried to end.
+/// Fractions of white below which lamps end.
 const THRESHOLDS: [f32; 3] = [0.002, 0.01, 0.05];
 
 impl DrawSettings {
-    /// The most accurate of a level with shadows.
+    /// The most accurate settings for a level with shadows.
     const MOST_ACCURATE: Self = Self {
         shading: Shading::Phong,
         shadows: true,
@@ -67,7 +68,8 @@ impl DrawSettings {
         multisample: true,
     };
 
-    /// How a World is drawn with these options, where no object chooses for itself.
+    /// Returns the settings with which a World is drawn with these options, for objects that do not choose
+    /// their own shading.
     pub fn current(world: &World, options: &FrameOptions) -> Self {
         let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
         Self {
@@ -80,7 +82,8 @@ impl DrawSettings {
         }
     }
 
-    /// Draws with a World and options that are so, objects that choose their shading themselves among them, and gives the World its own settings back.
+    /// Calls `draw` with a World and options that have these settings, also for objects that choose their own
+    /// shading, and restores the World's settings.
     pub(crate) fn drawn<T>(
         &self,
         world: &mut World,
@@ -103,7 +106,7 @@ impl DrawSettings {
         drawn
     }
 
-    /// What it is called beside the most accurate of its level.
+    /// Returns the label of these settings, which says how they differ from the most accurate ones.
     pub(crate) fn label(&self, reference: &Self) -> String {
         let of_maps = (self.shadow_filter, self.shadow_resolution);
         let shadows = match self.shadows {
@@ -123,7 +126,7 @@ impl DrawSettings {
         format!("{}{shadows}{lamps}{samples}", self.shading)
     }
 
-    /// As `lumbre render` is asked for them.
+    /// Returns the arguments of `lumbre render` for these settings.
     pub fn arguments(&self) -> String {
         let shadows = match self.shadows {
             true => format!(
@@ -137,7 +140,7 @@ impl DrawSettings {
         format!("--shading {}{shadows} --light-threshold {}{samples}", self.shading, self.light_threshold)
     }
 
-    /// What a level's file holds of them for its frames.
+    /// Returns the part of the settings that a level's file stores.
     pub fn frame(&self) -> FrameSettings {
         FrameSettings {
             multisample: Some(self.multisample),
@@ -147,20 +150,21 @@ impl DrawSettings {
         }
     }
 
-    /// What of them is the World's: objects that choose their shading keep it.
+    /// Applies the part of the settings that belongs to the World. Objects that choose their shading keep it.
     pub(super) fn set(&self, world: &mut World) {
         let mut settings = world.get_resource_or_insert_with(SceneSettings::default);
         (settings.shading, settings.frame) = (self.shading, self.frame());
     }
 
-    /// What of them is the frame's.
+    /// Returns the part of the settings that belongs to the frame.
     pub(super) fn options(&self) -> FrameOptions {
         FrameOptions { shadows: self.shadows, ..FrameOptions::default() }
     }
 }
 
 impl Choices {
-    /// The most accurate way: the others are measured against it. Where nothing casts a shadow, maps are as usual.
+    /// Returns the most accurate settings, against which the others are measured. If nothing casts shadows,
+    /// shadow maps have the default settings.
     pub fn reference(&self) -> DrawSettings {
         let usual = FrameSettings::default();
         let most = DrawSettings::MOST_ACCURATE;
@@ -168,7 +172,7 @@ impl Choices {
         DrawSettings { shadow_resolution, ..most }
     }
 
-    /// Of a level, shown with this exposure, or with that of its cameras.
+    /// Returns the choices for a level that is displayed with this exposure, or with that of its cameras.
     pub fn of(world: &mut World, exposure: Option<f32>) -> Self {
         let mut lights = world.query::<&Light>();
         let shining: Vec<&Light> = lights.iter(world).filter(|light| light.enabled).collect();
@@ -183,10 +187,10 @@ impl Choices {
 }
 
 impl Stage {
-    /// In their order.
+    /// All stages, in their order.
     pub const ALL: [Self; 3] = [Self::Evaluations, Self::Shadows, Self::Lamps];
 
-    /// The settings that differ from these in what is chosen here, these themselves left out.
+    /// Returns the settings that differ from `from` in what this stage chooses, without `from` itself.
     pub fn others(self, from: DrawSettings, choices: &Choices) -> Vec<DrawSettings> {
         let mut others = Vec::new();
         match self {
@@ -215,7 +219,7 @@ impl Stage {
     }
 }
 
-/// Rates of evaluation that are tried, the most accurate first.
+/// Returns the shadings that are tried, the most accurate first.
 fn rates() -> impl Iterator<Item = Shading> {
     let by_need = BOUNDS.into_iter().filter_map(ErrorBound::new);
     let by_need = by_need.map(|max_error| Shading::Auto { max_error });

@@ -1,20 +1,22 @@
-//! What settings have to keep, and which of several keeps it best. Not how they are measured.
+//! The goal of tuning, and which settings reach it best.
 
 use crate::Point;
 
-/// What settings have to keep.
+/// The limits that settings have to keep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Goal {
-    /// Milliseconds that a frame may take, at the camera that takes the longest.
+    /// Largest time of a frame in milliseconds, at the slowest camera.
     pub milliseconds: Option<f64>,
-    /// Relative RMSE against the most accurate settings, at the camera that is the farthest off.
+    /// Largest relative RMSE against the most accurate settings, at the camera with the largest error.
     pub error: Option<f64>,
 }
 
-/// Errors that are no farther apart look alike: a quarter of a step of eight bits, in a picture of half grey.
+/// Errors that differ by no more than this look alike: a quarter of a step of eight bits, in a picture of
+/// medium grey.
 const ALIKE: f64 = 0.002;
 
-/// The setting that keeps the goal best: the least error where a time is given, and of those that look alike the cheapest; else the least time.
+/// Returns the settings that reach the goal best: with a time limit, those with the least error, or the
+/// cheapest of those that look alike; otherwise the fastest.
 pub(crate) fn choose(points: &[Point], goal: Goal) -> Option<usize> {
     let known = points
         .iter()

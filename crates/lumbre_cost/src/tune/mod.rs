@@ -1,5 +1,5 @@
-//! Which settings to draw a level with: one choice after another is measured side by side at every camera, what another way beats is dropped, and of what is left the one is
-//! taken that keeps a goal. Not the studies, which explain; this decides.
+//! Finds the settings with which to draw a level. The choices are measured stage by stage at every camera,
+//! and what another way beats is dropped. Of the remaining ways, the one that reaches a goal best is chosen.
 
 mod candidates;
 mod draw_settings;
@@ -34,41 +34,43 @@ use crate::{
     pareto_front,
 };
 
-/// What was found.
+/// The result of tuning.
 #[derive(Clone, Debug, Default)]
 pub struct Tuned {
-    /// All settings with their times and errors, those that may be the best with more rounds; and what was found, in sentences.
+    /// All settings with their times and errors, and the findings. The settings on the front were measured in
+    /// more rounds.
     pub study: Study,
     /// The settings of each point of the study.
     pub settings: Vec<DrawSettings>,
-    /// The points that no other one beats, from the cheapest to the most accurate.
+    /// Indices of the points that no other one beats, from the cheapest to the most accurate.
     pub front: Vec<usize>,
-    /// The point that keeps the goal best; none where none keeps it.
+    /// Index of the point that reaches the goal best; `None` if none does.
     pub chosen: Option<usize>,
     pictures: Measured,
 }
 
-/// Seconds for frames of all settings, and of those at the front once more.
+/// Seconds for the frames of all settings, and for the final measurement of those on the front.
 const SECONDS: [f64; 2] = [10.0, 15.0];
 
-/// What is asked of [`tune`].
+/// The options of [`tune`].
 #[derive(Clone, Debug)]
 pub struct TuneOptions {
     /// The level.
     pub file: PathBuf,
-    /// What settings have to keep.
+    /// The limits that the settings have to keep.
     pub goal: Goal,
-    /// Fewer rounds.
+    /// Whether to measure fewer rounds.
     pub quick: bool,
     /// Width and height of the frames in pixels.
     pub size: (u32, u32),
 }
 
-/// Measures every way to draw a file at each of its cameras, and takes the best that keeps the goal: the least error within a time, or the least time within an
-/// error; of equals, the cheaper. With a folder it writes a report there, as of `lumbre cost`.
+/// Measures every way to draw a file at each of its cameras, and chooses the one that reaches the goal best:
+/// the least error within a time, or the least time within an error. If `report` names a folder, a report
+/// like that of `lumbre cost` is written there.
 ///
 /// # Errors
-/// [`CostError`]; [`CostError::Interrupted`] if the listener asks for it.
+/// [`CostError`]; [`CostError::Interrupted`] if the listener asks to stop.
 pub fn tune(
     gpu: &Gpu,
     options: &TuneOptions,
@@ -139,7 +141,7 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
             }
         }
     }
-    // Only what may be the best is worth more rounds.
+    // Only the ways that may be chosen are worth more rounds.
     let contenders = found.contenders();
     let ways: Vec<DrawSettings> = contenders.iter().map(|&one| found.settings[one]).collect();
     let again = draw_at_cameras(conditions, scene, &cameras, &ways, SECONDS[1], [0.6, 1.0])?;
@@ -150,10 +152,10 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     let mut study = Study { points, ..std::mem::take(&mut measured.study) };
     if choosers > 0 {
         study.notes.push(format!(
-            "{choosers} objects choose their shading themselves and keep it; --shading of the commands asks nobody."
+            "{choosers} objects choose their own shading and keep it here; --shading in the commands overrides it."
         ));
     }
-    // The others were timed at another hour, and are beaten.
+    // The other ways are beaten, and their times are from earlier rounds.
     let last: Vec<Point> = contenders.iter().map(|&place| study.points[place].clone()).collect();
     let place = |point: &Point| Some(contenders[last.iter().position(|other| std::ptr::eq(other, point))?]);
     let front: Vec<usize> = pareto_front(&last).into_iter().filter_map(place).collect();
@@ -162,30 +164,31 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     Ok(Tuned { study, settings, front, chosen, pictures: measured })
 }
 
-/// What the picture of a camera under the most accurate settings is called.
+/// Returns the name of a camera's reference picture.
 fn reference_name(number: usize, camera: &str) -> String {
     format!("reference {number} {camera}")
 }
 
-/// The camera that takes the longest, by its median.
+/// Returns the time of the slowest camera, by its median.
 fn longest(drawn: &[DrawnFrame]) -> Option<Spread> {
     let spreads = drawn.iter().filter_map(|drawn| Spread::of(&drawn.times));
     spreads.max_by(|a, b| a.median.total_cmp(&b.median))
 }
 
-/// The cameras by name; each entity is the same whenever the file is read.
+/// Returns the cameras with their names. Entities are the same whenever the file is read.
 fn cameras(world: &mut World) -> Vec<(Entity, String)> {
     let mut cameras = world.query_filtered::<(Entity, Option<&Name>, Has<ActiveCamera>), With<Camera>>();
     let mut found: Vec<(Entity, String, bool)> = cameras
         .iter(world)
         .map(|(entity, name, active)| (entity, name.map_or("camera", Name::as_str).to_owned(), active))
         .collect();
-    // The one that a program begins with comes first.
+    // The active camera comes first.
     found.sort_by_key(|(entity, _, active)| (!active, *entity));
     found.into_iter().map(|(entity, name, _)| (entity, name)).collect()
 }
 
-/// Frames of some of the settings at every camera: per setting, per camera. `told` are the shares that are done before and after.
+/// Draws frames with some settings at every camera, and returns them by settings and camera. `told` are the
+/// fractions that are done before and after.
 fn draw_at_cameras(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
@@ -212,7 +215,8 @@ fn draw_at_cameras(
     Ok(found)
 }
 
-/// A way's point: the longest time and the largest error of all cameras, with the picture of that camera. Nothing without a camera.
+/// Creates the point of a way, with the picture and the error of the camera with the largest error. `None` if
+/// there is no camera.
 fn point(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
@@ -257,10 +261,10 @@ fn study(scene: &str) -> Study {
     Study {
         name: "tune".into(),
         title: format!("Settings for {scene}"),
-        question: "Which settings draw it with the least error within a time, or in the least time within an error?".into(),
-        reference: "the most accurate of them: Phong shading with soft shadows of twice the usual resolution, lamps without an end, and four samples a pixel; time and error are those of the camera that is the worst".into(),
+        question: "Which settings draw the level with the least error within a time, or in the least time within an error?".into(),
+        reference: "the most accurate settings: Phong shading with soft shadows of twice the default resolution, lamps that do not end, and four samples per pixel; times are those of the slowest camera, and errors those of the camera with the largest error".into(),
         plots: vec![Plot {
-            title: "Error against time".into(),
+            title: "Error over time".into(),
             across: Quantity::Milliseconds,
             up: Quantity::Error,
             front: true,
@@ -287,14 +291,14 @@ fn findings(
         _ if within.is_empty() => None,
         (Some(place), ..) => Some(format!("Within {within}: {}.", told(&place))),
         (None, Some(cheapest), Some(best)) => Some(format!(
-            "Nothing keeps within {within}; the cheapest is {}, the most accurate {}.",
+            "No settings keep within {within}; the cheapest settings are {}, the most accurate {}.",
             told(cheapest),
             told(best)
         )),
         _ => None,
     };
     let ways = format!(
-        "{} ways to draw it at {cameras} {}; {} of them are beaten by none.",
+        "{} settings were measured at {cameras} {}; {} of them are not beaten by any others in both time and error.",
         points.len(),
         if cameras == 1 { "camera" } else { "cameras" },
         front.len()

@@ -1,4 +1,5 @@
-//! Two reports that are really measured, of which the second is of a slower and of a worse level: `--compare` finds what was planted, and nothing where nothing was.
+//! Two measured reports, of which the second is of a slower and of a worse level: `--compare` finds what was
+//! planted, and nothing where nothing was.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,7 +13,8 @@ use lumbre_scene::{Camera, Mesh, Name, Transform};
 
 use super::{measured, options, saved};
 
-/// A shiny ball of so many subdivisions, drawn so often over itself, from the outside inwards: every one is shaded.
+/// A shiny ball with this number of subdivisions, drawn this many times over itself from the inside outwards,
+/// so that every copy is shaded.
 fn balls(depth: u32, layers: u32) -> World {
     let mut world = World::new();
     let shiny = Surface {
@@ -32,7 +34,7 @@ fn balls(depth: u32, layers: u32) -> World {
     world
 }
 
-/// Of the shading of a level, which has the same name each time.
+/// The report of the study `shading` on a level, which has the same name each time.
 fn report(folder: &Path, name: &str, world: World) -> CostReport {
     let own = folder.join(name);
     std::fs::create_dir_all(&own).unwrap();
@@ -47,7 +49,8 @@ fn a_slow_down_and_an_error_that_are_planted_in_a_level_are_found() {
     let before = report(folder.path(), "before", balls(5, 1));
     let worse = |change: &&Change| change.is_worse();
 
-    // Forty balls in place of one: far beyond any hour's noise, in time and in triangles, and the picture is hardly another.
+    // Forty balls in place of one change the time and the triangles far beyond any noise, and the picture
+    // hardly at all.
     let slow = compare_reports(&before, &report(folder.path(), "slow", balls(5, 40)), 1.5);
     let slower: Vec<&Change> = slow.iter().filter(|change| change.is_slower()).collect();
     assert_eq!(slower.len(), 3, "flat, Gouraud and Phong: {slow:?}");
@@ -55,14 +58,14 @@ fn a_slow_down_and_an_error_that_are_planted_in_a_level_are_found() {
         |change: &Change| matches!(&change.what, What::Count { name, .. } if name == "triangles");
     assert!(slow.iter().any(|change| change.is_worse() && is_triangles(change)), "{slow:?}");
 
-    // A coarser ball: Gouraud shading is farther from the equation at every pixel; the frame gets no slower.
+    // On a coarser ball, Gouraud shading has a larger error at every pixel, and the frame is not slower.
     let coarse = compare_reports(&before, &report(folder.path(), "coarse", balls(3, 1)), 1.5);
     let errors: Vec<&Change> =
         coarse.iter().filter(worse).filter(|change| matches!(change.what, What::Error { .. })).collect();
     assert!(errors.iter().any(|change| change.point.starts_with("Gouraud")), "{coarse:?}");
     assert!(!coarse.iter().any(Change::is_slower), "{coarse:?}");
 
-    // The same level once more: nothing grew.
+    // On the same level again, nothing has grown.
     let same = compare_reports(&before, &report(folder.path(), "same", balls(5, 1)), 1.5);
     assert_eq!(same.iter().filter(worse).count(), 0, "{same:?}");
 }

@@ -1,5 +1,6 @@
-//! The regression gate: the counts of cheap studies against those that were kept, by what `lumbre cost --compare` compares with. Counts of the processor alone, which are
-//! the same on every machine: triangles, draws, bytes that are uploaded, lamps in lists, rays, texels, patches.
+//! The regression gate: compares the counts of cheap studies with stored ones, by the code behind `lumbre
+//! cost --compare`. Only counts of the CPU are used, which are the same on every machine: triangles, draw
+//! calls, uploaded bytes, lamps in lists, rays, texels, patches.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,9 +9,10 @@ use lumbre_cost::{Change, CostOptions, CostReport, What, compare_reports, read_r
 
 use super::{measured, options};
 
-/// What is counted.
+/// The studies whose counts are compared.
 const WATCHED: &[&str] = &["shading", "need", "lamps", "bake", "preprocessing", "reflection"];
-/// By which factor a count may grow: the last digits of f32 decide whether a lamp reaches a cluster, and where a bake has rays enough.
+/// The factor by which a count may grow. The last digits of f32 decide whether a lamp reaches a cluster, and
+/// when a bake has enough rays.
 const FACTOR: f64 = 1.1;
 const RENEWED_BY: &str = "LUMBRE_WRITE_GOLDENS=1 cargo test --workspace --test studies counts";
 
@@ -18,7 +20,8 @@ fn kept() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/studies/counts.json")
 }
 
-/// What is wrong with counts beside those that are kept: what grew or is gone, and what nobody watches over yet.
+/// Returns what is wrong with counts compared with the stored ones: what has grown or is missing, and what is
+/// not stored yet.
 fn faults(kept: &CostReport, counted: &CostReport) -> Vec<String> {
     let is_fault = |change: &Change| change.is_worse() || change.what == What::New;
     let changes = compare_reports(kept, counted, FACTOR);
@@ -46,7 +49,7 @@ fn counts_have_not_grown() {
         found.join("\n")
     );
 
-    // What would be found: every count of every point, and every point.
+    // Every missing or larger count of every point would be found, and every missing point.
     for (place, study) in before.studies.iter().enumerate() {
         for (number, point) in study.points.iter().enumerate() {
             for (name, count) in &point.counts {
@@ -62,7 +65,7 @@ fn counts_have_not_grown() {
             assert_eq!(faults(&fewer, &before).len(), 1, "{}", point.label);
         }
     }
-    // None is empty, and nothing of them is a time or this machine's.
+    // No study is empty, and nothing in them is a time or belongs to this machine.
     for name in WATCHED {
         let study = before.study(name).unwrap();
         assert!(!study.points.is_empty(), "nothing was counted of {name}");

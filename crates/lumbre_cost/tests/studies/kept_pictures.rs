@@ -1,11 +1,12 @@
-//! The errors of a report, worked out again from the pictures that it keeps, by the plain formula: of every study and every point that has a picture.
+//! Computes the errors of a report again from the pictures that it keeps, by the plain formula, for every
+//! point of every study that has a picture.
 
 use glam::DVec3;
 use lumbre_cost::{CostOptions, ErrorOver, Picture, STUDIES, read_picture};
 
 use super::{measured, options};
 
-/// Root mean square difference over that of the reference, and the largest difference of a channel.
+/// Root mean square difference divided by that of the reference, and the largest difference of a channel.
 fn errors(reference: &Picture, picture: &Picture, over: ErrorOver) -> [f64; 2] {
     let (mut squares, mut size, mut largest) = (0.0, 0.0, 0.0_f64);
     for (wanted, found) in reference.radiance.iter().zip(&picture.radiance) {
@@ -21,7 +22,8 @@ fn errors(reference: &Picture, picture: &Picture, over: ErrorOver) -> [f64; 2] {
     [if squares == 0.0 { 0.0 } else { (squares / size).sqrt() }, largest]
 }
 
-/// Of lightmaps, as bakes state it: root mean square and largest difference over the mean of the reference, where both have a texel.
+/// The errors of lightmaps as bakes state them: root mean square and largest difference divided by the mean
+/// of the reference, over the texels that both have.
 fn errors_of_maps(reference: &Picture, found: &Picture) -> [f64; 2] {
     let (mut squares, mut sum, mut largest, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
     for (wanted, found) in reference.radiance.iter().zip(&found.radiance) {
@@ -54,13 +56,13 @@ fn errors_are_those_of_the_pictures_that_are_kept() {
             let read = |name: &String| read_picture(folder.path(), name).unwrap();
             let ([found, largest], noise) = match (&files.maps, files.error_of) {
                 (Some(maps), ErrorOver::Beyond) => {
-                    // What the reference's own noise makes of it was taken off, and is known to a fifth.
+                    // The noise of the reference was subtracted, and is known to a fifth.
                     (errors_of_maps(&read(&maps.reference), &read(&maps.picture)), 5.0 * error.uncertainty)
                 }
                 (None, over) => (errors(&read(&files.reference), &read(&files.picture), over), 0.0),
                 other => panic!("{name}: {other:?}"),
             };
-            // What is kept is rounded to f32.
+            // Kept pictures are rounded to f32.
             let bound = 1e-6 * found + 1e-7;
             assert!(found - error.relative_rmse > -bound, "{name}: {found} {error:?}");
             assert!(found - error.relative_rmse < bound + noise, "{name}: {found} {error:?}");

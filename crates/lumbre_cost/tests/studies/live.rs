@@ -1,4 +1,5 @@
-//! What is measured of a view between a window's frames, on scenes whose answers are known; and that the World is afterwards as it was before.
+//! Measurements of a view between the frames of a window, on scenes whose answers are known. They leave the
+//! World unchanged.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -57,7 +58,8 @@ fn costs(side: &mut SideView, world: &mut World) -> Vec<LightCost> {
     }
 }
 
-/// Light that hardly bends between vertices wants no more than Gouraud shading, and flat shading is too far off; what is exact is at the end of the front.
+/// Light that is almost linear between vertices needs no more than Gouraud shading, while flat shading has
+/// too large an error. The exact way is at the end of the front.
 #[test]
 fn a_views_front_leads_from_what_is_cheap_to_what_is_exact() {
     let mut world = floor(16);
@@ -69,7 +71,7 @@ fn a_views_front_leads_from_what_is_cheap_to_what_is_exact() {
     update_transforms(&mut world);
     let options = FrameOptions { multisample: Some(true), ..FrameOptions::default() };
     let found = front(&mut side(), &mut world, &options);
-    // Which of the ways is the cheapest the hour may decide; how far off they are it does not.
+    // Times decide which of the ways is the cheapest; the errors do not depend on them.
     let cheap = &found.ways[found.within_error(0.01)];
     assert!(cheap.error <= 0.01 && cheap.settings.shading != Shading::Flat, "{found:?}");
     let best = found.ways.last().expect("there is a front");
@@ -88,7 +90,8 @@ fn a_views_front_leads_from_what_is_cheap_to_what_is_exact() {
     assert_eq!(*settings, before, "the World has its own settings again");
 }
 
-/// A lamp below the floor gives nothing, one of two equal lamps half of what both give; many are measured by their kind.
+/// A lamp below the floor contributes nothing, and one of two equal lamps half of what both do. Many lamps
+/// are measured by their kind.
 #[test]
 fn what_lights_give_is_known() {
     let mut world = floor(1);
@@ -121,7 +124,8 @@ fn what_lights_give_is_known() {
     assert!(many.difference > 0.99, "{many:?}");
 }
 
-/// The error of a frame of one quad under Gouraud shading, worked out from two pictures; none where the frame is drawn as the reference is.
+/// The error of a frame of one quad under Gouraud shading, computed from two pictures; none where the frame
+/// is drawn as the reference is.
 #[test]
 fn the_error_beside_the_reference_is_that_of_the_pictures() {
     let mut world = floor(1);

@@ -1,4 +1,5 @@
-//! Studies from end to end on scenes whose answer is known, the pictures that a report keeps, and what becomes of a report that is interrupted.
+//! Whole studies on scenes whose answer is known, the pictures that a report keeps, and reports that are
+//! interrupted.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -67,7 +68,7 @@ fn gouraud_is_phong_on_a_matt_plane_under_a_distant_light() {
     let report = measured(&options(&["shading"], vec![path]), &folder.path().join("report"));
     for series in ["flat", "Gouraud", "Phong"] {
         let error = point(&report, "shading", series).error.unwrap();
-        // f32's unit in the last place is 6e-8, and a cosine takes a handful of roundings.
+        // The unit in the last place of f32 is 6e-8, and a cosine takes a handful of roundings.
         assert!(error.relative_rmse < 1e-6, "{series}: {error:?}");
         assert!(error.flip.unwrap() < 1e-3, "{series}: {error:?}");
     }
@@ -77,7 +78,8 @@ fn gouraud_is_phong_on_a_matt_plane_under_a_distant_light() {
     assert!(phong.counts["fragment invocations"] >= 48.0 * 32.0, "{:?}", phong.counts);
 }
 
-/// A closed box whose every side glows with the same radiance and reflects half of what it gets: inside, every direction is as bright.
+/// A closed box whose sides all glow with the same radiance and reflect half of what they receive: inside,
+/// every direction is equally bright.
 fn furnace() -> World {
     let outward = shapes::cuboid(Vec3::splat(2.0), 1);
     let turned = |triangle: &[u32; 3]| [triangle[0], triangle[2], triangle[1]];
@@ -104,7 +106,8 @@ fn a_furnace_is_baked_without_error() {
     assert!(study.points.len() >= 5);
     for point in &study.points {
         let (error, stated) = (point.error.unwrap(), point.figures["error stated, % of the mean"]);
-        // E = π (1 + 1/2 + 1/4 + …): all that is left is what the solver's residual and f32 leave, and what the bake states of itself.
+        // E = π (1 + 1/2 + 1/4 + …): the remaining error is that of the solver's residual and of f32, and the
+        // one that the bake states.
         let bound = 1e-3 + stated / 100.0 + error.uncertainty;
         assert!(
             error.relative_rmse <= bound,
@@ -116,10 +119,10 @@ fn a_furnace_is_baked_without_error() {
     }
 }
 
-/// What a final bake casts for form factors, whatever the level.
+/// Rays that a final bake casts for form factors, whatever the level.
 const FORM_FACTOR_RAYS: f64 = 1.5e6;
 
-/// Two closed rooms apart from each other, each with a lamp; in one stand a box and the camera.
+/// Two closed rooms apart from each other, each with a lamp; one of them contains a box and the camera.
 fn two_rooms() -> World {
     let mut world = World::new();
     let mut inward = shapes::cuboid(Vec3::new(4.0, 2.5, 4.0), 1);
@@ -157,7 +160,8 @@ fn lightmaps_beat_ambient_light_and_a_far_room_is_not_baked_again() {
     let bakes: Vec<&Point> = study.of_series("bake after a change").collect();
     let [whole, changed] = bakes[..] else { panic!("{bakes:?}") };
     assert!(changed.label.contains("small box"), "{}", changed.label);
-    // Half of the level is another room; form factors take as many rays in any case, and direct light is told anew.
+    // Half of the level is another room. Form factors take the same rays in any case, and direct light is
+    // computed again.
     let by_light = |bake: &Point| bake.counts["rays"] - FORM_FACTOR_RAYS;
     assert!(by_light(whole) > 0.0 && by_light(changed) < 0.85 * by_light(whole), "{changed:?} {whole:?}");
     assert!(study.findings.len() == 3 && study.notes.is_empty(), "{:?} {:?}", study.findings, study.notes);
@@ -177,16 +181,15 @@ fn a_file_with_nothing_to_bake_is_said_to_have_nothing() {
         }
         world
     };
-    for (name, is_static, why) in [
-        ("lamps.glb", true, "has no light that is baked"),
-        ("moving.glb", false, "Nothing of moving is static"),
-    ] {
+    for (name, is_static, why) in
+        [("lamps.glb", true, "has no baked lights"), ("moving.glb", false, "Nothing in moving is static")]
+    {
         let path = saved(folder.path(), name, dark(is_static));
         let asked = options(&["bake", "preprocessing", "lightmaps", "transport"], vec![path]);
         let report = measured(&asked, &folder.path().join("report"));
         for study in &report.studies {
             assert!(study.notes.iter().any(|note| note.contains(why)), "{}: {:?}", study.name, study.notes);
-            // Paths and lamps want no bake; of all else nothing can be said.
+            // Paths and lamps need no bake; the other studies have nothing to measure.
             let is_empty = study.points.is_empty() && study.findings.is_empty();
             assert_eq!(is_empty, study.name != "transport", "{}: {:?}", study.name, study.findings);
             assert!(!study.points.iter().any(|point| point.label.contains("lightmaps")), "{}", study.name);
@@ -200,7 +203,7 @@ fn a_report_goes_on() {
     let asked = options(&["shading", "reflection"], Vec::new());
     let report = measured(&asked, folder.path());
 
-    // Finer meshes are nearer, in every shading.
+    // Finer meshes have smaller errors with every shading.
     let shading = report.study("shading").unwrap();
     for series in ["flat", "Gouraud", "Phong"] {
         let errors: Vec<f64> =
@@ -214,16 +217,16 @@ fn a_report_goes_on() {
     let page = std::fs::read_to_string(folder.path().join(PAGE)).unwrap();
     assert!(page.contains("<section id=\"shading\">") && page.contains("<section id=\"reflection\">"));
 
-    // What is there is kept to the bit, and what is asked for besides is added.
+    // Existing studies are kept to the bit, and requested ones are added.
     let again = CostOptions { resume: true, ..options(&["shading", "reflection", "precision"], Vec::new()) };
     let more = measured(&again, folder.path());
     assert_eq!(more.studies[..2], report.studies[..]);
     assert_eq!(more.studies.len(), 3);
     assert_eq!(read_report(folder.path()).unwrap(), more);
-    // What is not asked for this time is kept, in its place on the page.
+    // Studies that are not requested this time are kept in their place on the page.
     let one = CostOptions { studies: studies_named(&["precision".into()]).unwrap(), ..again.clone() };
     assert_eq!(measured(&one, folder.path()), more);
-    // What another method or another program has measured is measured anew, and only that.
+    // Studies that another method or another program has measured are measured again, and only those.
     let altered = |alter: &dyn Fn(&mut CostReport)| {
         let mut old = more.clone();
         alter(&mut old);

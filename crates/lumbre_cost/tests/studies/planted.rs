@@ -1,4 +1,5 @@
-//! `tune` on levels whose best settings are known: for each choice one where it costs much and gives nothing, and one where it has to be paid for.
+//! `tune` on levels whose best settings are known: for each choice, one level where it costs much without any
+//! gain, and one where it is needed.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -22,7 +23,7 @@ fn tuned(world: World, goal: Goal, report: Option<&Path>) -> Tuned {
     tune(&gpu, &options, report, &|_| ControlFlow::Continue(())).unwrap()
 }
 
-/// The settings with the least time within an error.
+/// Returns the settings with the least time within an error.
 fn cheapest_within(error: f64, world: World) -> (DrawSettings, Tuned) {
     let tuned = tuned(world, Goal { milliseconds: None, error: Some(error) }, None);
     (tuned.settings[tuned.chosen.unwrap()], tuned)
@@ -43,8 +44,8 @@ fn floor(world: &mut World, pieces: u32) {
     world.spawn((Name::new("floor"), plane, Material::matt(Vec3::splat(0.6))));
 }
 
-/// A matt plane of 16 x 16 squares that fills the frame, under lamps that are far beside its squares: for every vertex there are a hundred pixels and more, and between
-/// vertices light hardly bends.
+/// A matt plane of 16 x 16 squares that fills the frame, under lamps that are far away compared with its
+/// squares. There are more than a hundred pixels per vertex, and between vertices the light is almost linear.
 fn smooth_light() -> World {
     let mut world = World::new();
     floor(&mut world, 16);
@@ -71,18 +72,18 @@ fn tuning_finds_a_planted_optimum() {
     assert!(cheap.settings.iter().all(|settings| settings.shadows));
     assert_eq!(read_report(&report).unwrap().study("tune"), Some(&cheap.study));
     let exact = tuned(Goal { milliseconds: Some(1e6), error: Some(1e-4) }, None);
-    // By need it may be Phong shading all the same, and is then as good.
+    // Shading by need may choose Phong shading too, and is then as good.
     let shading = exact.settings[exact.chosen.unwrap()].shading;
     assert!(matches!(shading, Shading::Phong | Shading::Auto { .. }), "{:?}", exact.study.findings);
     let none = tuned(Goal { milliseconds: Some(1e-6), error: None }, None);
     assert!(
-        none.chosen.is_none() && none.study.findings[0].contains("Nothing keeps"),
+        none.chosen.is_none() && none.study.findings[0].contains("No settings keep"),
         "{:?}",
         none.study.findings
     );
 }
 
-/// Slats that glow, and so cost nothing to shade: all that can be wrong is their edges.
+/// Glowing slats, which cost nothing to shade: only their edges can be wrong.
 fn glowing_slats() -> World {
     let mut world = World::new();
     let front = Surface { emission: Vec3::ONE, ..Surface::default() };
@@ -106,10 +107,11 @@ fn samples_are_taken_where_edges_want_them() {
     assert!(one > 0.05, "without them it is off by {one}");
 }
 
-/// Lamps without an end: some of this brightness over the floor that is seen, and many faint ones far beside it.
+/// Lamps that do not end: some with this brightness over the visible floor, and many faint ones far beside
+/// it.
 fn lamps_afar((near, color): (u32, f32), far: u32) -> World {
     let mut world = World::new();
-    // Of few vertices, so that only fragments are right about the light.
+    // The floor has few vertices, so that only lighting per fragment is accurate.
     floor(&mut world, 1);
     let lamp = |color: f32| Light { radius: 0.0, ..Light::point(Vec3::splat(color)) };
     for number in 0..near {
@@ -127,16 +129,17 @@ fn lamps_afar((near, color): (u32, f32), far: u32) -> World {
 
 #[test]
 fn lamps_end_where_they_bring_nothing_and_go_on_where_they_do() {
-    // 120 lamps of 0.05 / 60² each: together a hundredth of what one lamp brings.
+    // 120 lamps of 0.05 / 60² each: together they contribute a hundredth of what one lamp does.
     let (chosen, tuned) = cheapest_within(0.05, lamps_afar((1, 4.0), 120));
     assert!(chosen.light_threshold > 0.0, "{:?}", tuned.study.findings);
-    // Lamps that bring 0.4 % of white each, and all of the light between them: wherever they end, it shows.
+    // Lamps that contribute 0.4 % of white each, and all of the light together: wherever they end, it is
+    // visible.
     let (chosen, tuned) = cheapest_within(0.05, lamps_afar((20, 0.1), 0));
     assert_eq!(chosen.light_threshold, 0.0, "{:?}", tuned.study.findings);
     assert!(error_of(&tuned, |settings| settings.light_threshold > 0.0) > 0.05);
 }
 
-/// A block under a spotlight whose shadow falls into the picture, or beside it.
+/// A block under a spotlight whose shadow is inside or outside of the picture.
 fn block_in_the_light(beside: f64, radius: f32) -> World {
     let mut world = World::new();
     floor(&mut world, 1);
@@ -160,11 +163,11 @@ fn block_in_the_light(beside: f64, radius: f32) -> World {
 fn shadows_go_where_nobody_sees_them_and_lose_what_they_do_not_need() {
     let (chosen, tuned) = cheapest_within(0.01, block_in_the_light(9.0, 0.3));
     assert!(!chosen.shadows, "{:?}", tuned.study.findings);
-    // A lamp of a millimetre: looking for its penumbra is in vain.
+    // The penumbra of a lamp of a millimetre is too small to be worth computing.
     let (chosen, tuned) = cheapest_within(0.08, block_in_the_light(0.0, 0.001));
     assert!(chosen.shadows && chosen.shadow_filter != ShadowFilter::Soft, "{:?}", tuned.study.findings);
     assert!(error_of(&tuned, |settings| !settings.shadows) > 0.08);
-    // A wide one: without its penumbra the picture is wrong.
+    // Without the penumbra of a wide lamp, the picture is wrong.
     let (chosen, tuned) = cheapest_within(0.02, block_in_the_light(0.0, 0.3));
     assert!(chosen.shadows && chosen.shadow_filter == ShadowFilter::Soft, "{:?}", tuned.study.findings);
 }

@@ -1,4 +1,5 @@
-//! The study of shadows where the answer is known: nothing in the way, and a lamp whose penumbra is as wide as its block.
+//! The study of shadows where the answer is known: nothing that casts a shadow, and a lamp whose penumbra is
+//! as wide as its block.
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use lumbre_scene::{Camera, Mesh, Name, Transform};
 
 use super::{measured, options, saved};
 
-/// A matt floor under a spotlight with a shadow, with a bar above it or none.
+/// A matt floor under a spotlight with a shadow, with or without a bar above it.
 fn floor_under_a_lamp(radius: f32, bar: bool) -> World {
     let mut world = World::new();
     let floor = Mesh(Arc::new(shapes::plane(30.0, 30.0, 1, 1)));
@@ -49,7 +50,7 @@ fn where_nothing_is_in_the_way_no_filter_is_off() {
     let study = study_of(floor_under_a_lamp(0.0, false));
     assert!(study.points.len() > 10);
     for point in &study.points {
-        // f32's roundings of the light itself.
+        // The light itself has the rounding errors of f32.
         let error = point.error.unwrap().relative_rmse;
         assert!(error < 1e-5, "{}, {}: {error}", point.series, point.label);
     }
@@ -64,7 +65,7 @@ fn a_penumbra_wants_soft_shadows_and_a_sharp_edge_texels() {
     let sharp = study_of(floor_under_a_lamp(0.0, true));
     let [few, many] = [0.25, 4.0].map(|resolution| error_of(&sharp, "hard", resolution));
     assert!(many < 0.6 * few, "{many} {few}: {:?}", sharp.findings);
-    // Where maps are drawn anew each time, the picture is the same.
+    // Redrawing the maps in every frame does not change the picture.
     for resolution in [1.0, 4.0] {
         let anew = error_of(&sharp, "soft, all maps drawn anew", resolution);
         assert_eq!(anew, error_of(&sharp, "soft", resolution));

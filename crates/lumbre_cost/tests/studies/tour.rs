@@ -1,4 +1,5 @@
-//! The study of a scene's cameras where the answer is known: what a planted fault of the frame costs, and which effect takes it away.
+//! The study of a scene's cameras where the answer is known: the error of a planted fault of the frame, and
+//! the effect that removes it.
 
 use lumbre_cost::{CostOptions, Study};
 use lumbre_optics::{Light, Material};
@@ -12,7 +13,8 @@ use lumbre_mesh::shapes;
 
 use super::{measured, options, saved};
 
-/// A floor, a ball over it and a wall, under a lamp whose shadow nobody asks for, or with a wall that mirrors and no shadow to be seen.
+/// A floor with a ball above it and a wall, under a lamp that does not ask for a shadow, or with a mirror on
+/// the wall and no visible shadow.
 fn scene(mirror: bool) -> World {
     let mut world = World::new();
     let mut spawn = |name: &str, mesh, material: Material, place: Transform| {
@@ -53,7 +55,7 @@ fn a_missing_shadow_is_what_a_frame_is_said_to_lack() {
         .map(|label| error_of(&study, label));
     assert!(now > 0.1 && shadows < 0.5 * now && without == now, "{now} {shadows} {without}");
     let said =
-        study.findings.iter().any(|finding| finding.contains("a shadow of every lamp would take most"));
+        study.findings.iter().any(|finding| finding.contains("\"a shadow of every lamp\" would remove most"));
     assert!(said, "{:?}", study.findings);
 }
 
@@ -61,8 +63,8 @@ fn a_missing_shadow_is_what_a_frame_is_said_to_lack() {
 fn what_mirrors_show_is_said_where_nothing_is_lacking() {
     let study = study_of(scene(true));
     let [now, without] = ["as it is", "without mirrors and glass"].map(|label| error_of(&study, label));
-    // What is left is the shadow behind the mirror.
+    // The remaining error is that of the shadow behind the mirror.
     assert!(now < 0.05 && without > 0.2, "{now} {without}");
-    let said = study.findings.iter().any(|finding| finding.contains("without what mirrors and glass show"));
+    let said = study.findings.iter().any(|finding| finding.contains("without mirrors and glass it would be"));
     assert!(said, "{:?}", study.findings);
 }

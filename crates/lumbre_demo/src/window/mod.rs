@@ -16,6 +16,7 @@ mod viewing;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+pub use keys::key_help;
 use winit::event_loop::EventLoop;
 
 use crate::{Action, OpenOptions, Opened, Recording};

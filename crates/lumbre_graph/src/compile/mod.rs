@@ -80,7 +80,7 @@ fn statuses(declarations: &Declarations, retention: &retain::Retention, needs: &
 /// Returns a reason such as "the scene has no lightmapped mesh and no fog".
 pub(crate) fn skip_reason(pass: &PassDeclaration) -> String {
     let absent: Vec<String> = pass
-        .calls_for
+        .requirements
         .iter()
         .filter(|(there, _)| !there)
         .map(|(_, what)| {

@@ -200,7 +200,7 @@ impl<'a, User> Graph<'a, User> {
             owner: self.owner.clone(),
             kind: K::KIND,
             accesses: Vec::new(),
-            calls_for: Vec::new(),
+            requirements: Vec::new(),
             side_effects: Vec::new(),
             fingerprint: None,
             after: Vec::new(),

@@ -1,4 +1,4 @@
-//! Declaring one pass: what it calls for, reads and writes, and how it runs.
+//! Declaring one pass: what it requires, reads and writes, and how it runs.
 
 use std::marker::PhantomData;
 
@@ -25,11 +25,11 @@ impl<'g, 'a, K: PassType, User> PassBuilder<'g, 'a, K, User> {
         Self { graph, index, kind: PhantomData }
     }
 
-    /// Adds something that the pass calls for, and whether it is there ("point lights", "a lightmapped mesh"). If
-    /// anything that a pass calls for is not there, the pass is skipped: each version that it would have written
+    /// Adds something that the pass requires, and whether it is there ("point lights", "a lightmapped mesh"). If
+    /// anything that a pass requires is not there, the pass is skipped: each version that it would have written
     /// has the content of the version before.
-    pub fn calls_for(mut self, there: bool, what: impl Into<Label>) -> Self {
-        self.pass().calls_for.push((there, what.into()));
+    pub fn requires(mut self, there: bool, what: impl Into<Label>) -> Self {
+        self.pass().requirements.push((there, what.into()));
         self
     }
 

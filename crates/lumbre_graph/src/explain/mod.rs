@@ -34,8 +34,9 @@ pub struct PassExplanation {
     /// Whether it runs, and why.
     #[serde(flatten)]
     pub status: Status,
-    /// What it calls for, each with whether it is there.
-    pub calls_for: Vec<Calling>,
+    /// What it requires, each with whether it is there.
+    #[serde(rename = "calls_for")]
+    pub requirements: Vec<Requirement>,
     /// Index of its wgpu pass in the frame, from 0; passes of the same group are merged. `None` if it does not run.
     pub group: Option<usize>,
     /// What it reads.
@@ -44,9 +45,9 @@ pub struct PassExplanation {
     pub writes: Vec<Use>,
 }
 
-/// One thing that a pass calls for.
+/// One thing that a pass requires.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Calling {
+pub struct Requirement {
     /// "a lightmapped mesh"
     pub what: String,
     /// Whether the scene has it.
@@ -117,10 +118,10 @@ impl Explanation {
                 owner: declared.owner.as_ref().map(ToString::to_string),
                 kind: declared.kind,
                 status: plan.status[index].clone(),
-                calls_for: declared
-                    .calls_for
+                requirements: declared
+                    .requirements
                     .iter()
-                    .map(|(there, what)| Calling { what: what.to_string(), there: *there })
+                    .map(|(there, what)| Requirement { what: what.to_string(), there: *there })
                     .collect(),
                 group: groups[index],
                 reads: uses(false),

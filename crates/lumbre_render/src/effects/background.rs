@@ -37,7 +37,7 @@ impl Effect for Background {
         true
     }
 
-    fn is_still(&mut self, _: &mut World) -> bool {
+    fn is_unchanged(&mut self, _: &mut World) -> bool {
         true
     }
 

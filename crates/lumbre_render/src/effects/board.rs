@@ -55,7 +55,7 @@ impl Board {
             // for reasons of their own.
             graph
                 .raster_pass("linear frame")
-                .calls_for(false, "use for a linear frame")
+                .requires(false, "use for a linear frame")
                 .color(&mut linear, LoadOp::Clear(wgpu::Color::BLACK))
                 .run(|_| Ok(()));
         }

@@ -11,10 +11,10 @@ use lumbre_optics::{decode_srgb, encode_srgb, tone_curve};
 use wgpu::util::DeviceExt;
 
 use super::{Board, Effect, EffectWork, FrameGraph, Stage};
-use crate::deferred::Deferred;
 use crate::error::EffectError;
 use crate::facts::SceneFacts;
 use crate::frame_plan::FrameShape;
+use crate::pending::Pending;
 use crate::shader::{self, DisplayVariant};
 use crate::target::Viewport;
 use crate::{Display, FrameOptions, Gpu, RenderError};
@@ -48,7 +48,7 @@ const UNEXPOSED: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
 #[derive(Debug)]
 struct OnDevice {
     layout: wgpu::BindGroupLayout,
-    pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
+    pipelines: HashMap<Key, Pending<wgpu::RenderPipeline>>,
     uniform: wgpu::Buffer,
     /// The content of the uniform: the exposure, and the corner of the viewport.
     written: [f32; 4],
@@ -69,7 +69,7 @@ impl Effect for DisplayPass {
         true
     }
 
-    fn is_still(&mut self, _: &mut World) -> bool {
+    fn is_unchanged(&mut self, _: &mut World) -> bool {
         true
     }
 
@@ -108,7 +108,7 @@ impl Effect for DisplayPass {
         };
         graph
             .raster_pass(self.name())
-            .calls_for(board.has_display_pass(), "use for a linear frame")
+            .requires(board.has_display_pass(), "use for a linear frame")
             .samples(&linear)
             .color(&mut board.target, load)
             .run(move |context| {
@@ -159,7 +159,7 @@ impl OnDevice {
     fn make(&mut self, gpu: &Gpu, key: Key) -> Result<(), EffectError> {
         let pipeline = self.pipelines.entry(key).or_insert_with(|| {
             let (device, layout) = (gpu.device.clone(), self.layout.clone());
-            Deferred::make(move || Ok(make(&device, &layout, key)?))
+            Pending::make(move || Ok(make(&device, &layout, key)?))
         });
         pipeline.is_there(true)?;
         Ok(())
@@ -170,12 +170,12 @@ impl OnDevice {
         let key = Key::of(frame);
         let pipeline = self.pipelines.entry(key).or_insert_with(|| {
             let (device, layout) = (gpu.device.clone(), self.layout.clone());
-            let rehearsals = frame.rehearsals.as_ref();
-            let rehearsal = rehearsals
-                .and_then(|all| all.of_pass(gpu, key.format, move |gpu, pass| rehearse(gpu, pass, key)));
-            Deferred::begin(gpu, move || {
+            let warm_ups = frame.warm_ups.as_ref();
+            let warm_up = warm_ups
+                .and_then(|all| all.of_pass(gpu, key.format, move |gpu, pass| warm_up(gpu, pass, key)));
+            Pending::begin(gpu, move || {
                 let pipeline = make(&device, &layout, key)?;
-                rehearsal.into_iter().for_each(|rehearsal| rehearsal());
+                warm_up.into_iter().for_each(|warm_up| warm_up());
                 Ok(pipeline)
             })
         });
@@ -199,7 +199,7 @@ impl OnDevice {
         key: &Key,
         frame: &wgpu::TextureView,
     ) {
-        let Some(Ok(pipeline)) = self.pipelines.get(key).and_then(Deferred::get) else { return };
+        let Some(Ok(pipeline)) = self.pipelines.get(key).and_then(Pending::get) else { return };
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("display"),
             layout: &self.layout,
@@ -215,11 +215,11 @@ impl OnDevice {
 }
 
 /// Draws once with a pipeline, from a frame of one texel, as a warm-up.
-fn rehearse(gpu: &Gpu, pass: &mut wgpu::RenderPass<'static>, key: Key) -> Result<(), EffectError> {
+fn warm_up(gpu: &Gpu, pass: &mut wgpu::RenderPass<'static>, key: Key) -> Result<(), EffectError> {
     let mut device = OnDevice::new(gpu);
     device.make(gpu, key)?;
     let frame = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("rehearsal"),
+        label: Some("warm-up"),
         size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 1,

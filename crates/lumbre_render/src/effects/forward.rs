@@ -26,7 +26,7 @@ impl Effect for Forward {
         self.opaque
     }
 
-    fn is_still(&mut self, _: &mut World) -> bool {
+    fn is_unchanged(&mut self, _: &mut World) -> bool {
         true
     }
 

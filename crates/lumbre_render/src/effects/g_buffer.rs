@@ -38,7 +38,7 @@ impl Effect for GBufferPass {
         self.contents.is_some()
     }
 
-    fn is_still(&mut self, _: &mut World) -> bool {
+    fn is_unchanged(&mut self, _: &mut World) -> bool {
         true
     }
 
@@ -53,7 +53,7 @@ impl Effect for GBufferPass {
         let nothing = LoadOp::Clear(wgpu::Color::TRANSPARENT);
         let mut pass = graph
             .raster_pass(self.name())
-            .calls_for(self.contents.is_some(), "deferred shading")
+            .requires(self.contents.is_some(), "deferred shading")
             .color(&mut surfaces, nothing);
         if let Some(details) = &mut details {
             pass = pass.color(details, nothing);
@@ -78,7 +78,7 @@ pub(super) fn opaque_pass<'a>(
 ) {
     let g_buffer = board.get::<GBuffer>().copied();
     let pass = board.lit_pass(graph, lit_pass.name(), LoadOp::Load);
-    let pass = calls.iter().fold(pass, |pass, (there, what)| pass.calls_for(*there, *what));
+    let pass = calls.iter().fold(pass, |pass, (there, what)| pass.requires(*there, *what));
     let textures = g_buffer.iter().flat_map(|of| [Some(of.surfaces), of.details]).flatten();
     let pass = textures.fold(pass, |pass, texture| pass.samples(&texture));
     pass.depth(&mut board.depth, LoadOp::Load).run(move |context| {

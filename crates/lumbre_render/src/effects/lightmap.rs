@@ -30,7 +30,7 @@ impl Effect for Lightmap {
         self.lightmapped && self.switched_on
     }
 
-    fn is_still(&mut self, _: &mut World) -> bool {
+    fn is_unchanged(&mut self, _: &mut World) -> bool {
         true
     }
 

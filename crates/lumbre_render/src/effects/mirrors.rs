@@ -19,7 +19,6 @@ use lumbre_scene::SceneSettings;
 use super::background::LARGEST_HALF;
 use super::surface_uniforms::SurfaceUniforms;
 use super::{Board, Effect, EffectWork, FrameGraph, Stage};
-use crate::deferred::Deferred;
 use crate::error::EffectError;
 use crate::extract::{LitPass, MirrorData};
 use crate::facts::SceneFacts;
@@ -29,6 +28,7 @@ use crate::frame_plan::{FrameShape, MirrorShape};
 use crate::frame_scene::FrameScene;
 use crate::layout::radiance;
 use crate::mesh_buffers::Attribute;
+use crate::pending::Pending;
 use crate::shader::{self, Feature};
 use crate::target::DEPTH_FORMAT;
 use crate::{FrameOptions, Gpu, RenderError};
@@ -64,7 +64,7 @@ struct Key {
 struct OnDevice {
     /// The layouts of a view with the objects, and of a surface with its reflection.
     layouts: [wgpu::BindGroupLayout; 2],
-    pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
+    pipelines: HashMap<Key, Pending<wgpu::RenderPipeline>>,
     surfaces: SurfaceUniforms,
 }
 
@@ -87,7 +87,7 @@ impl Effect for Mirrors {
         facts.calls_for_mirrors(options)
     }
 
-    fn is_still(&mut self, _: &mut World) -> bool {
+    fn is_unchanged(&mut self, _: &mut World) -> bool {
         true
     }
 
@@ -143,10 +143,10 @@ impl Effect for Mirrors {
         board.insert(of_glass);
         let pass = board
             .lit_pass(graph, self.name(), LoadOp::Load)
-            .calls_for(in_scene, "flat mesh that mirrors")
-            .calls_for(switched_on, "mirrors switched on")
+            .requires(in_scene, "flat mesh that mirrors")
+            .requires(switched_on, "mirrors switched on")
             // In an explanation without a device this is not known.
-            .calls_for(self.views.is_none() || !shown.is_empty(), "mirror in sight");
+            .requires(self.views.is_none() || !shown.is_empty(), "mirror in sight");
         let pass = shown.iter().fold(pass, |pass, (_, picture)| pass.samples(picture));
         pass.depth(&mut board.depth, LoadOp::Load).run(move |context| self.add_to(0, context, &shown));
     }
@@ -216,7 +216,7 @@ impl Mirrors {
         let (Some(views), Some(device), Some(key)) = (&self.views, &self.device, &self.key) else {
             return Ok(());
         };
-        let Some(Ok(pipeline)) = device.pipelines.get(key).and_then(Deferred::get) else { return Ok(()) };
+        let Some(Ok(pipeline)) = device.pipelines.get(key).and_then(Pending::get) else { return Ok(()) };
         let Some(bound) = context.user.view_and_transforms(parent) else { return Ok(()) };
         context.pass.set_pipeline(pipeline);
         let seen_from = device.view_group(context.resources.device, bound);
@@ -330,7 +330,7 @@ impl OnDevice {
         let pipeline = self.pipelines.entry(key).or_insert_with(|| {
             let (device, layouts) = (gpu.device.clone(), self.layouts.clone());
             let make = move || Ok(make(&device, &layouts, key)?);
-            if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
+            if wait { Pending::make(make) } else { Pending::begin(gpu, make) }
         });
         Ok(pipeline.is_there(wait)?)
     }

@@ -85,7 +85,7 @@ impl EffectWork {
 /// The methods are called once per frame in this order: `extract`; `ready` (unless frames wait for pipelines)
 /// and `prepare`, if the effect is called for; `declare`. An explanation without a device does not call
 /// `prepare` and runs no pass. If pipelines are still being created, `extract` and `ready` are called once
-/// more with the facts and options that an earlier frame was decided by. If nothing has changed (`is_still`),
+/// more with the facts and options that an earlier frame was decided by. If nothing has changed (`is_unchanged`),
 /// neither is called.
 pub trait Effect: Send + Sync {
     /// Returns its name in plain words, for plans and errors.
@@ -95,21 +95,21 @@ pub trait Effect: Send + Sync {
     fn stage(&self) -> Stage;
 
     /// Takes what it needs this frame from the World. Returns true if the scene calls for the effect.
-    /// [`PassBuilder::calls_for`](lumbre_graph::PassBuilder::calls_for) of its passes gives the reason.
+    /// [`PassBuilder::requires`](lumbre_graph::PassBuilder::requires) of its passes gives the reason.
     fn extract(&mut self, world: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool;
 
     /// Returns true if `extract` would return the same as last time, for the same options and a World in
     /// which no camera, light, mesh, material, texture, transform or setting has changed. An effect that
     /// depends on nothing else returns true; one with components of its own checks whether these have
     /// changed.
-    fn is_still(&mut self, world: &mut World) -> bool {
+    fn is_unchanged(&mut self, world: &mut World) -> bool {
         let _ = world;
         false
     }
 
     /// Returns true if its pipelines exist, in frames that do not wait for them
     /// ([`MissingPipelines::Background`](crate::MissingPipelines)). An effect that keeps its pipelines as
-    /// [`Deferred`](crate::Deferred) starts to create them here. Until it returns true, frames are drawn
+    /// [`Pending`](crate::Pending) starts to create them here. Until it returns true, frames are drawn
     /// without it, or as they were drawn with it before.
     ///
     /// # Errors

@@ -19,7 +19,6 @@ use lumbre_graph::{LoadOp, PassResources, RasterContext, RunError, TextureDescri
 use super::mirrors::MirrorPictures;
 use super::surface_uniforms::SurfaceUniforms;
 use super::{Board, Effect, EffectWork, FrameGraph, Stage};
-use crate::deferred::Deferred;
 use crate::error::EffectError;
 use crate::extract::{LitPass, RefractorData, RefractorSurface};
 use crate::facts::SceneFacts;
@@ -27,6 +26,7 @@ use crate::features::{fog_feature, fog_flags};
 use crate::frame_bindings::FrameBuffer;
 use crate::frame_plan::FrameShape;
 use crate::frame_scene::{FrameScene, SHAPE};
+use crate::pending::Pending;
 use crate::shader::{self, Feature};
 use crate::target::DEPTH_FORMAT;
 use crate::{FrameOptions, Gpu, RenderError};
@@ -85,7 +85,7 @@ impl Keys {
 #[derive(Debug)]
 struct OnDevice {
     layouts: Layouts,
-    pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
+    pipelines: HashMap<Key, Pending<wgpu::RenderPipeline>>,
     surfaces: SurfaceUniforms,
 }
 
@@ -124,7 +124,7 @@ impl Effect for Refraction {
         facts.refractive > 0
     }
 
-    fn is_still(&mut self, _: &mut World) -> bool {
+    fn is_unchanged(&mut self, _: &mut World) -> bool {
         true
     }
 
@@ -192,9 +192,9 @@ impl Effect for Refraction {
         }
         board
             .lit_pass(graph, LitPass::Refraction.name(), LoadOp::Load)
-            .calls_for(in_scene, "mesh that light passes through")
-            .calls_for(switched_on, "refraction switched on")
-            .calls_for(in_sight, "such mesh in sight")
+            .requires(in_scene, "mesh that light passes through")
+            .requires(switched_on, "refraction switched on")
+            .requires(in_sight, "such mesh in sight")
             .depth(&mut board.depth, LoadOp::Load)
             .run(|context| {
                 context.user.draw(context.pass, LitPass::Refraction);
@@ -222,7 +222,7 @@ impl Refraction {
     /// Returns a pipeline of this frame and its device objects.
     fn pipeline(&self, of: impl Fn(&Keys) -> Key) -> Option<(&OnDevice, &wgpu::RenderPipeline)> {
         let device = self.device.as_ref()?;
-        let pipeline = device.pipelines.get(&of(self.keys.as_ref()?)).and_then(Deferred::get)?.ok()?;
+        let pipeline = device.pipelines.get(&of(self.keys.as_ref()?)).and_then(Pending::get)?.ok()?;
         Some((device, pipeline))
     }
 
@@ -330,7 +330,7 @@ impl OnDevice {
         let pipeline = self.pipelines.entry(key).or_insert_with(|| {
             let (device, layouts) = (gpu.device.clone(), self.layouts.clone());
             let make = move || Ok(make(&device, &layouts, key)?);
-            if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
+            if wait { Pending::make(make) } else { Pending::begin(gpu, make) }
         });
         Ok(pipeline.is_there(wait)?)
     }

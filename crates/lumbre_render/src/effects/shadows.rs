@@ -34,7 +34,7 @@ impl Effect for Shadows {
         self.called_for == [true, true]
     }
 
-    fn is_still(&mut self, _: &mut World) -> bool {
+    fn is_unchanged(&mut self, _: &mut World) -> bool {
         true
     }
 
@@ -68,10 +68,10 @@ impl Effect for Shadows {
         };
         let mut pass = graph
             .raster_pass(self.name())
-            .calls_for(asked, "light that asks for a shadow")
-            .calls_for(switched_on, "shadows switched on");
+            .requires(asked, "light that asks for a shadow")
+            .requires(switched_on, "shadows switched on");
         if let Some(atlas) = &self.atlas {
-            pass = pass.calls_for(atlas.stale, "shadow map that changed");
+            pass = pass.requires(atlas.stale, "shadow map that changed");
         }
         pass.depth(&mut atlas, load).run(|context| {
             context.user.draw_shadow_maps(context.pass);

@@ -27,14 +27,14 @@ impl Effect for Transparent {
         self.blended
     }
 
-    fn is_still(&mut self, _: &mut World) -> bool {
+    fn is_unchanged(&mut self, _: &mut World) -> bool {
         true
     }
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
         board
             .lit_pass(graph, self.name(), LoadOp::Load)
-            .calls_for(self.blended, "transparent material")
+            .requires(self.blended, "transparent material")
             .depth(&mut board.depth, LoadOp::Load)
             .run(|context| {
                 context.user.draw(context.pass, LitPass::Transparent);

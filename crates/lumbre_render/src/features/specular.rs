@@ -13,7 +13,7 @@ pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
     if object.specular {
         let (distribution, fresnel) = (object.distribution, object.fresnel);
         let chosen = (distribution, fresnel) != (Distribution::default(), Fresnel::default());
-        variant.set(Feature::EnergyKeeping, object.energy_keeping);
+        variant.set(Feature::EnergyConserving, object.energy_conserving);
         variant.set(Feature::Microfacets, chosen);
         variant.set(Feature::DistributionCosinePower, distribution == Distribution::CosinePower);
         variant.set(Feature::DistributionGaussian, distribution == Distribution::Gaussian);

@@ -109,7 +109,7 @@ features! {
     /// Samples an occlusion texture.
     OcclusionTexture = 40 => "OCCLUSION_TEXTURE",
     /// Its highlight is normalized, like glTF's.
-    EnergyKeeping = 41 => "ENERGY_KEEPING",
+    EnergyConserving = 41 => "ENERGY_CONSERVING",
     /// Writes the target's final values; the frame has no display pass.
     Display = 42 => "DISPLAY",
     /// Applies a tone curve, for viewing.
@@ -324,7 +324,7 @@ impl Variant {
             self.bits &= !(Feature::SharpHighlights as u64
                 | Feature::SpecularAntialiasing as u64
                 | Feature::LocalViewer as u64
-                | Feature::EnergyKeeping as u64
+                | Feature::EnergyConserving as u64
                 | Feature::CountLights as u64
                 | Feature::Matt as u64);
             if by_volume {
@@ -339,11 +339,11 @@ impl Variant {
             // Without a highlight nothing depends on the viewer.
             self.bits &= !(Feature::SharpHighlights as u64
                 | Feature::SpecularAntialiasing as u64
-                | Feature::EnergyKeeping as u64
+                | Feature::EnergyConserving as u64
                 | Feature::LocalViewer as u64);
             self.reflection = ReflectionModel::Phong;
         }
-        if self.reflection != ReflectionModel::TorranceSparrow || self.has(Feature::EnergyKeeping) {
+        if self.reflection != ReflectionModel::TorranceSparrow || self.has(Feature::EnergyConserving) {
             self.bits &= !(Feature::Microfacets as u64
                 | Feature::DistributionCosinePower as u64
                 | Feature::DistributionGaussian as u64

@@ -8,10 +8,10 @@ mod views;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec3, DVec4, Mat4};
 
-use crate::deferred::Deferred;
 use crate::extract::{CameraView, Object, Objects};
 use crate::growable_buffer::GrowableBuffer;
 use crate::mesh_buffers::{Attribute, MeshBuffers, MeshKey};
+use crate::pending::Pending;
 use crate::shader::{self, TABLES_IN_TEXTURES};
 use crate::shadow_light::{MAX_VIEWS, ShadowKind, ShadowLight};
 use crate::table_texture::table_binding;
@@ -74,7 +74,7 @@ pub(crate) struct ShadowMaps {
     pub stale: Vec<StaleMap>,
     views: GrowableBuffer<ViewData>,
     matrices: Vec<u8>,
-    casters: Option<Deferred<CasterPipelines>>,
+    casters: Option<Pending<CasterPipelines>>,
     device: Option<OnDevice>,
     /// Side of the next atlas, in texels.
     side: u32,
@@ -138,7 +138,7 @@ impl ShadowMaps {
                 afterwards.into_iter().for_each(|afterwards| afterwards());
                 Ok(casters)
             };
-            if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
+            if wait { Pending::make(make) } else { Pending::begin(gpu, make) }
         });
         let variant = || "shadow_caster".to_owned();
         casters.is_there(wait).map_err(|message| RenderError::Shader { variant: variant(), message })

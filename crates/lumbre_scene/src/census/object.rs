@@ -41,8 +41,8 @@ pub struct ObjectTraits {
     pub sharp: bool,
     /// Whether it has a lightmap and texture coordinates for it.
     pub lightmapped: bool,
-    /// Whether its specular lobe is glTF's energy-keeping one.
-    pub energy_keeping: bool,
+    /// Whether its specular lobe is glTF's energy-conserving one.
+    pub energy_conserving: bool,
     /// Its microfacet distribution, for the Torrance-Sparrow model.
     pub distribution: Distribution,
     /// Its Fresnel reflectance, for the Torrance-Sparrow model.
@@ -118,7 +118,7 @@ impl ObjectTraits {
                 || back.is_some_and(Surface::has_sharp_highlight)
                 || roughness_map,
             lightmapped: lightmap.is_some() && !mesh.uv1.is_empty(),
-            energy_keeping: material.lobe == Lobe::EnergyKeeping,
+            energy_conserving: material.lobe == Lobe::EnergyConserving,
             distribution: material.distribution,
             fresnel: material.fresnel,
             shading: shading.copied(),

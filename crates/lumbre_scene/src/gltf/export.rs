@@ -17,7 +17,7 @@ use super::{container, export_scene, uri};
 use crate::lightmap_files::{
     EncodingError, LightmapFileError, PackedFormat, Supercompression, lightmap_to_ktx2, lightmap_to_open_exr,
 };
-use crate::{IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage, SeparateLight};
+use crate::{IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage, QuadricError, SeparateLight};
 
 /// Options for the images of baked light that are written beside a glTF file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -123,6 +123,14 @@ pub enum SaveError {
         place: String,
         /// What is wrong with it.
         source: MaterialError,
+    },
+    /// An exact surface is invalid and could not be loaded again.
+    #[error("{place}: LUMBRE_quadric: {source}")]
+    Quadric {
+        /// The entity.
+        place: String,
+        /// What is wrong with it.
+        source: QuadricError,
     },
     /// Fog is invalid and could not be loaded again.
     #[error("scene: {source}")]
@@ -373,7 +381,10 @@ impl LightmapFiles {
             Some(&known) => known,
             None => {
                 // An atlas is shared by several nodes, so it keeps its own name.
-                let atlas = image.name.split('.').next().filter(|name| name.starts_with("atlas-"));
+                // The name of an image that was loaded is a path.
+                let file = Path::new(&image.name).file_name().and_then(|file| file.to_str());
+                let atlas =
+                    file.and_then(|file| file.split('.').next()).filter(|name| name.starts_with("atlas-"));
                 let name = self.file_name(atlas.or(node), index, "exr");
                 self.known.insert(Arc::as_ptr(image), self.images.len());
                 self.images.push((name, image.clone()));

@@ -1,9 +1,9 @@
 //! Writes several files so that each appears under its final name only when it is complete.
 //!
-//! A process keeps a lock on one of the `.partial` files it is writing. If none of a process's `.partial`
-//! files in a folder is locked, the process was killed, and the files are removed.
+//! In each folder, a process keeps a lock on one of the `.partial` files it is writing. If none of a process's
+//! `.partial` files in a folder is locked, the process was killed, and the files are removed.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::Write;
@@ -16,8 +16,8 @@ use super::export::SaveError;
 pub(crate) struct Files {
     /// (temporary path, final path)
     waiting: Vec<(PathBuf, PathBuf)>,
-    /// One of the temporary files, locked so that other processes do not remove them.
-    held: Option<File>,
+    /// One temporary file of each folder, locked so that other processes do not remove the folder's.
+    held: HashMap<PathBuf, File>,
     /// Folders already searched for leftover temporary files.
     tidied: HashSet<PathBuf>,
     /// Folders that were created.
@@ -55,6 +55,14 @@ fn tidy(folder: &Path) {
     }
 }
 
+/// The folder that a file lies in.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
 impl Files {
     /// Creates a folder in an existing one. Failures are ignored here; writing into the folder reports them.
     pub(crate) fn make_folder(&mut self, folder: &Path) {
@@ -72,10 +80,7 @@ impl Files {
                 "the path names no file",
             )));
         };
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
+        let folder = folder_of(path);
         if self.tidied.insert(folder.to_owned()) {
             tidy(folder);
         }
@@ -88,7 +93,7 @@ impl Files {
                 Ok(mut file) => {
                     // Another process may have removed the file before it was locked. Without support for
                     // locks nothing is removed.
-                    if self.held.is_none()
+                    if !self.held.contains_key(folder)
                         && (matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !temporary.exists())
                     {
                         let _ = fs::remove_file(&temporary);
@@ -96,7 +101,7 @@ impl Files {
                     }
                     self.waiting.push((temporary, path.to_owned()));
                     let written = file.write_all(bytes).and_then(|()| file.sync_all()).map_err(failed);
-                    self.held.get_or_insert(file);
+                    self.held.entry(folder.to_owned()).or_insert(file);
                     return written;
                 }
                 Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
@@ -112,9 +117,12 @@ impl Files {
     /// Renames all files to their final names, in the order in which they were written.
     pub(crate) fn commit(mut self) -> Result<Vec<PathBuf>, SaveError> {
         let mut done = Vec::new();
-        // Renaming the first file ends the protection by its lock, so the last one is locked as well.
-        let last = self.waiting.last().and_then(|(temporary, _)| File::open(temporary).ok());
-        let _ = last.as_ref().map(File::try_lock);
+        // Renaming a folder's first file ends the protection by its lock, so its last one is locked as well.
+        let last: BTreeMap<_, _> = self.waiting.iter().map(|(file, _)| (folder_of(file), file)).collect();
+        let opened: Vec<_> = last.into_values().filter_map(|temporary| File::open(temporary).ok()).collect();
+        for file in &opened {
+            let _ = file.try_lock();
+        }
         while !self.waiting.is_empty() {
             let (temporary, path) = &self.waiting[0];
             fs::rename(temporary, path).map_err(|source| SaveError::Write { path: path.clone(), source })?;
@@ -165,6 +173,28 @@ mod tests {
         assert_eq!(fs::read(at("other.glb")).unwrap(), b"other");
         assert_eq!(fs::read(at("room.glb")).unwrap(), b"new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), kept.len() + 1);
+    }
+
+    #[test]
+    fn what_is_being_written_stays_in_every_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let names = ["room.glb", "walls/floor.exr", "walls/roof.exr", "textures/wood.png"];
+        let mut other = Files::default();
+        for sub in ["walls", "textures"] {
+            other.make_folder(&at(sub));
+        }
+        for name in names {
+            other.write(&at(name), name.as_bytes()).unwrap();
+        }
+        let mut files = Files::default();
+        for name in ["hall.glb", "walls/hall.exr", "textures/hall.png"] {
+            files.write(&at(name), b"new").unwrap();
+        }
+        other.commit().unwrap();
+        for name in names {
+            assert_eq!(fs::read_to_string(at(name)).unwrap(), name);
+        }
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub(crate) fn material(
         || material.ior != defaults.ior
         || medium.is_some_and(|medium| medium != Medium::default())
         || material.distribution != defaults.distribution
-        || material.lobe != Lobe::EnergyKeeping
+        || material.lobe != Lobe::EnergyConserving
         || !plain_fresnel;
     if !exact || beyond {
         let front = if textures.metallic_roughness.is_some() {

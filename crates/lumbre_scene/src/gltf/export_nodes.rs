@@ -274,6 +274,8 @@ impl Nodes {
             extend(node, "LUMBRE_shading", choices.into());
         }
         if let Some(quadric) = appearance.quadric.as_ref().filter(|_| node.contains_key("mesh")) {
+            let place = || group.first().map_or_else(String::new, |&entity| place(name, entity));
+            quadric.validate().map_err(|source| SaveError::Quadric { place: place(), source })?;
             let extension = serde_json::to_value(QuadricExtension::of(quadric));
             extend(node, "LUMBRE_quadric", extension.map_err(|source| SaveError::Json { source })?);
         }

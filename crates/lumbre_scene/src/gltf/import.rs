@@ -9,7 +9,7 @@ use super::accessor::Buffers;
 use super::decoders::{self, OptionalDecoder};
 use super::document::{self, Document, shortened};
 use super::error::{LoadError, LoadProblem, Note, Notes};
-use super::limits::LoadLimits;
+use super::limits::{Budget, LoadLimits};
 use super::options::LoadOptions;
 use super::patch::Patch;
 use super::prepared::{Prepared, PreparedNode, PreparedPrimitive, prepare};
@@ -118,7 +118,7 @@ fn read(bytes: &[u8], base: Base<'_>, options: &LoadOptions) -> Result<(Prepared
         document_of_instances = Document::from_root(patch.root(), &mut notes)?;
         buffers.document = &document_of_instances;
     }
-    let prepared = decode(&buffers, bytes.len() as u64, base, options.limits, &mut notes)?;
+    let prepared = decode(&buffers, budget, base, options.limits, &mut notes)?;
     Ok((prepared, notes))
 }
 
@@ -185,16 +185,16 @@ pub(crate) fn contents<'a>(
     Ok(contents)
 }
 
-/// Validates and decodes everything in the scene of a file of `file_bytes` bytes.
+/// Validates and decodes everything in the scene of a file. `budget` is what decompression and instances have
+/// left of the limit on decoded bytes.
 pub(crate) fn decode(
     buffers: &Buffers<'_>,
-    file_bytes: u64,
+    budget: Budget,
     base: Base<'_>,
     limits: LoadLimits,
     notes: &mut Notes,
 ) -> Result<Prepared, LoadProblem> {
     let document = buffers.document;
-    let budget = limits.budget(file_bytes as usize, document, &buffers.bytes);
     let mut prepared = prepare(document, buffers, base, limits, budget, notes)?;
     prepared.files = files_beside(document, base);
     Ok(prepared)

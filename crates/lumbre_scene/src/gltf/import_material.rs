@@ -290,7 +290,7 @@ pub(crate) fn front_from_metallic_roughness(
 }
 
 /// The lobe of a material that does not state one: bare if it has LUMBRE_materials_phong and either no
-/// metallic-roughness texture or microfacet parameters of its own, otherwise energy-keeping.
+/// metallic-roughness texture or microfacet parameters of its own, otherwise energy-conserving.
 pub(crate) fn default_lobe(phong: Option<&PhongMaterial>, textured: bool) -> Lobe {
     let bare = phong.is_some_and(|phong| {
         let chooses = phong.distribution.is_some()
@@ -299,7 +299,7 @@ pub(crate) fn default_lobe(phong: Option<&PhongMaterial>, textured: bool) -> Lob
             || phong.absorption.is_some();
         !textured || chooses
     });
-    if bare { Lobe::Bare } else { Lobe::EnergyKeeping }
+    if bare { Lobe::Bare } else { Lobe::EnergyConserving }
 }
 
 /// The Fresnel model: a conductor if `eta` or `absorption` is given, unless the material states another. The

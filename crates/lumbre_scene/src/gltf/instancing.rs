@@ -139,14 +139,19 @@ fn write(patch: &mut Patch, index: usize, node: &Node, mesh: usize, instances: V
     patch.set(&place!["nodes", index, "children"], children.into());
     patch.remove(&place!["nodes", index, "mesh"]);
     let extensions = place!["nodes", index, "extensions"];
-    patch.remove(&[&extensions[..], &place![EXTENSION]].concat());
+    for name in [EXTENSION, QUADRIC] {
+        patch.remove(&[&extensions[..], &place![name]].concat());
+    }
     if patch.get(&extensions).and_then(Value::as_object).is_some_and(Map::is_empty) {
         patch.remove(&extensions);
     }
 }
 
 /// Extensions of a node that concern its own mesh rather than its children.
-const FOR_MESHES: [&str; 2] = ["LUMBRE_object", "LUMBRE_shading"];
+const FOR_MESHES: [&str; 3] = ["LUMBRE_object", "LUMBRE_shading", QUADRIC];
+
+/// Unlike the others, this extension must not stay at a node that no longer has a mesh.
+const QUADRIC: &str = "LUMBRE_quadric";
 
 fn cloned((name, value): (&String, &Value)) -> (String, Value) {
     (name.clone(), value.clone())

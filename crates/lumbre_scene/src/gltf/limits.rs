@@ -57,6 +57,7 @@ fn compressed_bytes(document: &Document) -> u64 {
 }
 
 /// A limit in bytes, and how much of it is used up.
+#[derive(Clone, Debug)]
 pub(crate) struct Budget {
     used: u64,
     limit: u64,

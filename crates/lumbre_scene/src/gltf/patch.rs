@@ -207,19 +207,19 @@ pub(crate) fn without_unused(patch: &mut Patch, extension: &str, list: &str) {
 }
 
 /// The outcome of undoing an earlier bake.
-pub(crate) enum Former {
+pub(crate) enum EarlierBake {
     /// The file has no record of a bake.
     None,
     /// The changes of the bake were undone.
-    TakenBack,
+    Undone,
     /// The file was modified after the bake, so the record no longer matches it. Only the record was removed.
-    Changed,
+    Modified,
 }
 
 /// Undoes the changes that an earlier bake made to a file.
-pub(crate) fn take_back(root: &mut Map<String, Value>) -> Former {
+pub(crate) fn undo_bake(root: &mut Map<String, Value>) -> EarlierBake {
     let Some(record) = root.get("extensions").and_then(|extensions| extensions.get(EXTENSION)) else {
-        return Former::None;
+        return EarlierBake::None;
     };
     let mut pristine = Value::Object(root.clone());
     let taken = Record::deserialize(record).ok().filter(|record| record.version == VERSION);
@@ -228,13 +228,13 @@ pub(crate) fn take_back(root: &mut Map<String, Value>) -> Former {
         && let Value::Object(pristine) = pristine
     {
         *root = pristine;
-        return Former::TakenBack;
+        return EarlierBake::Undone;
     }
     // Remove the record, so that it cannot be mistaken for a valid one later.
     if let Some(Value::Object(extensions)) = root.get_mut("extensions") {
         extensions.shift_remove(EXTENSION);
     }
-    Former::Changed
+    EarlierBake::Modified
 }
 
 /// Adds to the record the URIs of the files that were copied beside the output.
@@ -367,14 +367,14 @@ mod tests {
         assert_eq!(copied(&object(baked.clone())), ["wall.png"]);
 
         let mut again = object(baked.clone());
-        assert!(matches!(take_back(&mut again), Former::TakenBack));
+        assert!(matches!(undo_bake(&mut again), EarlierBake::Undone));
         assert_eq!(Value::Object(again.clone()), original);
-        assert!(matches!(take_back(&mut again), Former::None));
+        assert!(matches!(undo_bake(&mut again), EarlierBake::None));
 
         // Another program added an accessor, so the record no longer matches and nothing is undone.
         let mut changed = object(baked);
         changed["accessors"].as_array_mut().unwrap().push(json!({}));
-        assert!(matches!(take_back(&mut changed), Former::Changed));
+        assert!(matches!(undo_bake(&mut changed), EarlierBake::Modified));
         assert_eq!(changed["accessors"].as_array().unwrap().len(), 3);
         assert_eq!(changed["nodes"][0]["extensions"]["LUMBRE_lightmap"]["image"], "b.exr");
     }
@@ -392,7 +392,7 @@ mod tests {
             let record = json!({"version": 1, "lengths": {}, "replaced": replaced});
             let mut root = object(json!({"asset": {"version": "2.0"}, "nodes": [{}],
                 "extensions": {"LUMBRE_bake": record}}));
-            assert!(matches!(take_back(&mut root), Former::Changed), "{replaced}");
+            assert!(matches!(undo_bake(&mut root), EarlierBake::Modified), "{replaced}");
             assert_eq!(root["nodes"], json!([{}]));
         }
     }

@@ -26,18 +26,19 @@ pub(crate) struct QuadricExtension {
     /// The coefficients a to j of a general quadric.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficients: Option<[f64; 10]>,
-    /// Minimum corner of the trim box, in metres.
+    /// Minimum corner of the trim box, in metres; `null` where the box is open.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub min: Option<[f64; 3]>,
-    /// Maximum corner of the trim box, in metres.
+    pub min: Option<Corner>,
+    /// Maximum corner of the trim box, in metres; `null` where the box is open.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub max: Option<[f64; 3]>,
+    pub max: Option<Corner>,
 }
+
+/// A corner of the trim box. A component is `None` if it is infinite, for which JSON has no number.
+type Corner = [Option<f64>; 3];
 
 /// All values of `kind`.
 const KINDS: [&str; 5] = ["plane", "sphere", "cylinder", "cone", "quadric"];
-/// Largest absolute value of a number, so that its square is finite in f64.
-const LARGEST: f64 = 1e100;
 
 impl QuadricExtension {
     /// Converts the JSON to a surface and validates it.
@@ -64,27 +65,18 @@ impl QuadricExtension {
             Some(other) => return Err(unknown(place, "LUMBRE_quadric.kind", other, KINDS.into_iter())),
             None => return Err(refused("kind", "missing".to_owned(), "say which surface it is")),
         };
-        // A missing corner leaves its sides unbounded.
-        let corner = |own: Option<[f64; 3]>, open: f64| own.map_or(DVec3::splat(open), DVec3::from_array);
+        let corner =
+            |own: Option<Corner>, open: f64| own.unwrap_or_default().map(|own| own.unwrap_or(open)).into();
         let trim = (self.min.is_some() || self.max.is_some())
             .then(|| [corner(self.min, f64::NEG_INFINITY), corner(self.max, f64::INFINITY)]);
         let quadric = Quadric { shape, trim };
-        let sizes =
-            [self.radius, self.height].into_iter().flatten().chain(self.coefficients.into_iter().flatten());
-        if sizes.into_iter().any(|value| value.abs() > LARGEST) {
-            return Err(refused(
-                "radius, height or coefficients",
-                "too large".to_owned(),
-                "stay below 1e100",
-            ));
-        }
         quadric
             .validate()
             .map_err(|error| refused("kind", format!("{:?}", self.kind), &error.to_string()))?;
         Ok(quadric)
     }
 
-    /// The JSON for a surface.
+    /// The JSON for a valid surface.
     pub fn of(quadric: &Quadric) -> Self {
         let kind = |name: &str| Self { kind: Some(name.to_owned()), ..Self::default() };
         let own = match quadric.shape {
@@ -106,8 +98,11 @@ impl QuadricExtension {
                 Self { coefficients: Some(coefficients), ..kind("quadric") }
             }
         };
-        let finite = |corner: DVec3| corner.is_finite().then(|| corner.to_array());
-        let [min, max] = quadric.trim.map_or([None, None], |trim| trim.map(finite));
+        let corner = |corner: DVec3| -> Option<Corner> {
+            let finite = corner.to_array().map(|value| value.is_finite().then_some(value));
+            finite.iter().any(Option::is_some).then_some(finite)
+        };
+        let [min, max] = quadric.trim.map_or([None, None], |trim| trim.map(corner));
         Self { min, max, ..own }
     }
 }
@@ -119,6 +114,8 @@ mod tests {
     #[test]
     fn surfaces_are_read_back_as_they_were_written() {
         let trim = Some([DVec3::new(-1.0, f64::MIN, -3.0), DVec3::new(1.0, 2.0, 3.0)]);
+        let open = Some([DVec3::NEG_INFINITY.with_y(0.0), DVec3::new(1.0, f64::INFINITY, 3.0)]);
+        let half_space = Some([DVec3::NEG_INFINITY, DVec3::INFINITY.with_y(0.5)]);
         for shape in [
             QuadricShape::Plane,
             QuadricShape::Sphere { radius: 0.1 },
@@ -126,7 +123,7 @@ mod tests {
             QuadricShape::Cone { radius: 2.0, height: 0.3, closed: false },
             QuadricShape::General { coefficients: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, -1.0] },
         ] {
-            for trim in [None, trim] {
+            for trim in [None, trim, open, half_space] {
                 let quadric = Quadric { shape, trim };
                 let json = serde_json::to_value(QuadricExtension::of(&quadric)).expect("numbers and words");
                 let again: QuadricExtension = serde_json::from_value(json).expect("what was written");

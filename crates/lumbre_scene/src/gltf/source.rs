@@ -10,8 +10,9 @@ use super::compressed::Decoded;
 use super::document::{self, Document};
 use super::error::{LoadError, LoadProblem, Notes};
 use super::import::{LoadReport, check_extensions, contents, decode, spawn};
+use super::limits::Budget;
 use super::options::LoadOptions;
-use super::patch::{Former, Patch, take_back};
+use super::patch::{EarlierBake, Patch, undo_bake};
 use super::uri::{self, Base};
 use super::{compressed, container, instancing};
 
@@ -33,7 +34,8 @@ pub struct SourceFile {
     /// The entity of each node; empty until the file is loaded into a World.
     pub(crate) nodes: Vec<Entity>,
     name: String,
-    file_bytes: u64,
+    /// What decompression and instances have left of the limit on decoded bytes.
+    budget: Budget,
     notes: Notes,
     options: LoadOptions,
 }
@@ -55,10 +57,10 @@ impl SourceFile {
         let mut notes = Notes { lenient: options.lenient, ..Notes::default() };
         let container = container::split(&bytes, &mut notes)?;
         let mut root = document::parse(container.json)?;
-        match take_back(&mut root) {
-            Former::None => {}
-            Former::TakenBack => notes.add("LUMBRE_bake", "was baked before; begins as it was then"),
-            Former::Changed => notes.add(
+        match undo_bake(&mut root) {
+            EarlierBake::None => {}
+            EarlierBake::Undone => notes.add("LUMBRE_bake", "was baked before; begins as it was then"),
+            EarlierBake::Modified => notes.add(
                 "LUMBRE_bake",
                 "was changed by another program after a bake; what that bake added is taken for the artist's",
             ),
@@ -79,21 +81,9 @@ impl SourceFile {
         let contents = buffers.bytes.into_iter().map(Cow::into_owned).collect();
         let document = if expanded { Document::from_root(patch.root(), &mut notes)? } else { document };
         let chunks = container.others.into_iter().map(|(kind, bytes)| (kind, bytes.to_vec())).collect();
-        let (name, file_bytes) = (name.to_owned(), bytes.len() as u64);
+        let name = name.to_owned();
         let (nodes, options) = (Vec::new(), options.clone());
-        Ok(Self {
-            patch,
-            document,
-            contents,
-            chunks,
-            decoded,
-            folder,
-            nodes,
-            name,
-            file_bytes,
-            notes,
-            options,
-        })
+        Ok(Self { patch, document, contents, chunks, decoded, folder, nodes, name, budget, notes, options })
     }
 
     /// Spawns its entities in a World, as [`load`](super::load()) does, and remembers them for
@@ -104,7 +94,8 @@ impl SourceFile {
     pub fn load_into(&mut self, world: &mut World) -> Result<LoadReport, LoadError> {
         let mut notes = std::mem::take(&mut self.notes);
         let limits = self.options.limits;
-        let prepared = decode(&self.buffers(), self.file_bytes, self.base(), limits, &mut notes)
+        let budget = self.budget.clone();
+        let prepared = decode(&self.buffers(), budget, self.base(), limits, &mut notes)
             .map_err(|problem| LoadError { file: self.name.clone(), problem: problem.into() })?;
         let report = spawn(world, prepared, notes);
         self.nodes.clone_from(&report.nodes);

@@ -41,7 +41,7 @@ struct PlacedQuadric {
 
 /// A surface that a ray crosses, before it is decided whether it counts as a hit.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Crossing {
+pub(crate) struct Candidate {
     pub object: usize,
     /// Whether the ray comes from the front.
     pub front: bool,
@@ -59,8 +59,8 @@ pub(crate) enum Place {
 
 /// The hit of a ray.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Meeting {
-    pub crossing: Crossing,
+pub(crate) struct Hit {
+    pub candidate: Candidate,
     /// Metres along the ray.
     pub distance: f64,
     /// Index of the triangle in the scene; `None` for exact surfaces.
@@ -105,14 +105,9 @@ impl Geometry {
     }
 
     /// Returns the nearest hit up to a distance that `accept` takes.
-    pub fn closest(
-        &self,
-        ray: &SpaceRay,
-        farthest: f64,
-        accept: impl Fn(&Crossing) -> bool,
-    ) -> Option<Meeting> {
+    pub fn closest(&self, ray: &SpaceRay, farthest: f64, accept: impl Fn(&Candidate) -> bool) -> Option<Hit> {
         let short = ray.for_triangles(farthest);
-        let accepted = |triangle, u, v| accept(&self.crossing(short.direction, triangle, u, v));
+        let accepted = |triangle, u, v| accept(&self.candidate(short.direction, triangle, u, v));
         // The nearest hit of all is nearly always accepted; the slower filtered query is needed only if it is
         // not.
         let found = self.bvh.closest_hit(&short).and_then(|hit| {
@@ -123,15 +118,15 @@ impl Geometry {
                 self.bvh.closest_hit_filtered(&short, accepted)
             }
         });
-        let mut nearest = found.map(|hit| Meeting {
-            crossing: self.crossing(short.direction, hit.triangle, hit.barycentric.0, hit.barycentric.1),
+        let mut nearest = found.map(|hit| Hit {
+            candidate: self.candidate(short.direction, hit.triangle, hit.barycentric.0, hit.barycentric.1),
             distance: f64::from(hit.distance),
             triangle: Some(hit.triangle),
         });
         for quadric in &self.quadrics {
             let farthest = nearest.as_ref().map_or(farthest, |nearest| nearest.distance);
-            if let Some(meeting) = quadric.closest(ray, farthest, &accept) {
-                nearest = Some(meeting);
+            if let Some(hit) = quadric.closest(ray, farthest, &accept) {
+                nearest = Some(hit);
             }
         }
         nearest
@@ -139,9 +134,9 @@ impl Geometry {
 
     /// Returns true if a surface that `accept` takes lies between the ray's start and the point at a
     /// distance, which may be infinite.
-    pub fn any_between(&self, ray: &SpaceRay, distance: f64, accept: impl Fn(&Crossing) -> bool) -> bool {
+    pub fn any_between(&self, ray: &SpaceRay, distance: f64, accept: impl Fn(&Candidate) -> bool) -> bool {
         let short = short_of_end(ray, distance);
-        let accepted = |triangle, u, v| accept(&self.crossing(short.direction, triangle, u, v));
+        let accepted = |triangle, u, v| accept(&self.candidate(short.direction, triangle, u, v));
         self.bvh.any_hit_filtered(&short, accepted) || self.any_exact_between(ray, distance, &accept)
     }
 
@@ -151,7 +146,7 @@ impl Geometry {
         self.bvh.any_hit(&short_of_end(ray, distance)) || self.any_exact_between(ray, distance, &|_| true)
     }
 
-    fn any_exact_between(&self, ray: &SpaceRay, distance: f64, accept: &impl Fn(&Crossing) -> bool) -> bool {
+    fn any_exact_between(&self, ray: &SpaceRay, distance: f64, accept: &impl Fn(&Candidate) -> bool) -> bool {
         let farthest = if distance.is_finite() { distance * EXACTLY_SHORT } else { distance };
         self.quadrics.iter().any(|quadric| quadric.closest(ray, farthest, accept).is_some())
     }
@@ -178,9 +173,9 @@ impl Geometry {
     }
 
     #[inline]
-    fn crossing(&self, direction: Vec3, triangle: u32, u: f32, v: f32) -> Crossing {
+    fn candidate(&self, direction: Vec3, triangle: u32, u: f32, v: f32) -> Candidate {
         let facet = &self.triangles[triangle as usize];
-        Crossing {
+        Candidate {
             object: facet.object as usize,
             front: direction.dot(facet.front) < 0.0,
             place: Place::Triangle { triangle: facet.number, weights: [f64::from(u), f64::from(v)] },
@@ -194,7 +189,7 @@ fn short_of_end(ray: &SpaceRay, distance: f64) -> Ray {
 }
 
 impl PlacedQuadric {
-    fn closest(&self, ray: &SpaceRay, farthest: f64, accept: &impl Fn(&Crossing) -> bool) -> Option<Meeting> {
+    fn closest(&self, ray: &SpaceRay, farthest: f64, accept: &impl Fn(&Candidate) -> bool) -> Option<Hit> {
         let origin = ray.exact_origin();
         if self.ball.is_some_and(|ball| ball.is_missed(origin, ray.direction, farthest)) {
             return None;
@@ -202,14 +197,14 @@ impl PlacedQuadric {
         // The transformed direction is not normalized, so that distances are the same in both spaces.
         let origin = self.to_own.transform_point3(origin);
         let direction = self.to_own.transform_vector3(ray.direction);
-        let crossing = |hit: &QuadricHit| {
+        let candidate = |hit: &QuadricHit| {
             let normal = (self.normals * hit.normal).normalize_or_zero();
             let point = self.from_own.transform_point3(hit.point);
             let front = ray.direction.dot(normal) < 0.0;
-            Crossing { object: self.object as usize, front, place: Place::Exact { point, normal } }
+            Candidate { object: self.object as usize, front, place: Place::Exact { point, normal } }
         };
-        let taken = |hit: &QuadricHit| accept(&crossing(hit));
+        let taken = |hit: &QuadricHit| accept(&candidate(hit));
         let hit = self.surface.closest(origin, direction, farthest, &taken)?;
-        Some(Meeting { crossing: crossing(&hit), distance: hit.distance, triangle: None })
+        Some(Hit { candidate: candidate(&hit), distance: hit.distance, triangle: None })
     }
 }

@@ -6,5 +6,5 @@ mod hierarchy;
 mod quadric;
 mod ray;
 
-pub(crate) use hierarchy::{Crossing, Geometry, Meeting, Place};
+pub(crate) use hierarchy::{Candidate, Geometry, Hit, Place};
 pub(crate) use ray::SpaceRay;

@@ -13,7 +13,7 @@ use lumbre_scene::SceneSettings;
 
 use crate::TraceError;
 use crate::fingerprint::{Fingerprint, of_debug};
-use crate::geometry::{Crossing, Geometry, Place};
+use crate::geometry::{Candidate, Geometry, Place};
 
 pub(crate) use collect::PlacedLight;
 pub(crate) use emissive_polygons::EmissivePolygon;
@@ -108,14 +108,14 @@ impl Scene {
 
     /// Returns true if a viewing ray sees the surface there: it is neither a culled back nor a hole in an
     /// alpha mask.
-    pub fn is_seen(&self, crossing: &Crossing) -> bool {
-        (crossing.front || self.passable[crossing.object].shows_back) && self.blocks(crossing)
+    pub fn is_seen(&self, candidate: &Candidate) -> bool {
+        (candidate.front || self.passable[candidate.object].shows_back) && self.blocks(candidate)
     }
 
     /// Returns true if the surface blocks light there, wholly or in part. Both sides do, but not the holes in
     /// an alpha mask.
-    pub fn blocks(&self, crossing: &Crossing) -> bool {
-        self.passable[crossing.object].passage != Passage::Cut || !self.is_hole(crossing)
+    pub fn blocks(&self, candidate: &Candidate) -> bool {
+        self.passable[candidate.object].passage != Passage::Cut || !self.is_hole(candidate)
     }
 
     /// Returns how rays pass an object.
@@ -149,10 +149,10 @@ impl Scene {
         self.objects.iter().any(|object| object.lightmap.is_some() || object.volume.is_some())
     }
 
-    fn is_hole(&self, crossing: &Crossing) -> bool {
-        let object = &self.objects[crossing.object];
+    fn is_hole(&self, candidate: &Candidate) -> bool {
+        let object = &self.objects[candidate.object];
         match object.material.alpha_mode {
-            AlphaMode::Mask { cutoff } => object.alpha(&crossing.place) < f64::from(cutoff),
+            AlphaMode::Mask { cutoff } => object.alpha(&candidate.place) < f64::from(cutoff),
             AlphaMode::Opaque | AlphaMode::Blend => false,
         }
     }

@@ -1,11 +1,10 @@
-//! Highlights that keep their energy: the specular term of glTF's metallic-roughness materials (glTF 2.0, appendix
+//! Energy-conserving highlights: the specular term of glTF's metallic-roughness materials (glTF 2.0, appendix
 //! B.3), and the lobes of Phong and Blinn with the same brightness. In the documents' highlights, which are bare
 //! powers of a cosine, k_s is the brightness at the peak; here it is the fraction of the light that a surface
 //! reflects when it is lit along its normal.
 //!
 //! The exponent n = 2/α² - 2 of n·h stands for the roughness throughout. A highlight of that width that reflects
 //! the fraction k_s of the light is 1/(4 α²) = (n + 2)/8 times as bright at its peak, and is proportional to n·l.
-//! is 1/(4 α²) = (n + 2)/8 times as bright at its peak, and weakens with n·l.
 //!
 //! **Which exponents.** Blinn's lobe takes n as it is. The angle of Phong's r·v is twice that of n·h, so Phong's
 //! lobe takes n/4, and so do the two half-vector forms of Phong's exponent. Compared with appendix B under a point

@@ -23,7 +23,7 @@ use crate::{EffectError, Gpu, RenderError};
 
 /// The warm-up device, and what draws need on it.
 #[derive(Debug)]
-struct Rehearsal {
+struct WarmUp {
     gpu: Gpu,
     pipelines: Pipelines,
     sets: TextureSets,
@@ -40,15 +40,15 @@ const ZEROS: u64 = 1 << 16;
 /// The warm-up device of a renderer, which is opened with the first warm-up draw. Two are equal if they are
 /// the same object.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Rehearsals(Arc<Mutex<Option<Rehearsal>>>);
+pub(crate) struct WarmUps(Arc<Mutex<Option<WarmUp>>>);
 
-impl PartialEq for Rehearsals {
+impl PartialEq for WarmUps {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 }
 
-impl Rehearsals {
+impl WarmUps {
     /// Returns a job that draws once with a pipeline and a material's textures; `None` if the adapter does
     /// not compile on the first draw.
     pub fn of(&self, gpu: &Gpu, key: PipelineKey, textures: Option<&TextureSet>) -> Option<Afterwards> {
@@ -57,12 +57,12 @@ impl Rehearsals {
             return None;
         }
         let textures = textures.map(|set| set.stand_ins.clone());
-        self.job(gpu, move |rehearsal| rehearsal.draw(key, textures.as_ref()))
+        self.job(gpu, move |warm_up| warm_up.draw(key, textures.as_ref()))
     }
 
     /// Returns a job that draws a shadow map once.
     pub fn of_casters(&self, gpu: &Gpu) -> Option<Afterwards> {
-        self.job(gpu, Rehearsal::draw_casters)
+        self.job(gpu, WarmUp::draw_casters)
     }
 
     /// Returns a job that draws once in a pass of an effect. `draw` creates what it needs on the device that
@@ -73,41 +73,41 @@ impl Rehearsals {
         format: wgpu::TextureFormat,
         draw: impl FnOnce(&Gpu, &mut wgpu::RenderPass<'static>) -> Result<(), EffectError> + Send + 'static,
     ) -> Option<Afterwards> {
-        self.job(gpu, move |rehearsal| rehearsal.draw_pass(format, draw).map_err(|error| error.to_string()))
+        self.job(gpu, move |warm_up| warm_up.draw_pass(format, draw).map_err(|error| error.to_string()))
     }
 
     fn job<E: Display>(
         &self,
         gpu: &Gpu,
-        draw: impl FnOnce(&mut Rehearsal) -> Result<(), E> + Send + 'static,
+        draw: impl FnOnce(&mut WarmUp) -> Result<(), E> + Send + 'static,
     ) -> Option<Afterwards> {
         if !gpu.is_software() {
             return None;
         }
         let (place, instance, adapter) = (Arc::clone(&self.0), gpu.instance.clone(), gpu.adapter.clone());
         Some(Box::new(move || {
-            let Ok(mut rehearsal) = place.lock() else { return };
-            if rehearsal.is_none() {
-                match Rehearsal::new(instance, adapter) {
-                    Ok(new) => *rehearsal = Some(new),
-                    Err(error) => tracing::debug!("nothing can be rehearsed: {error}"),
+            let Ok(mut warm_up) = place.lock() else { return };
+            if warm_up.is_none() {
+                match WarmUp::new(instance, adapter) {
+                    Ok(new) => *warm_up = Some(new),
+                    Err(error) => tracing::debug!("no pipeline can be warmed up: {error}"),
                 }
             }
-            let Some(rehearsal) = &mut *rehearsal else { return };
-            if let Err(error) = draw(rehearsal) {
+            let Some(warm_up) = &mut *warm_up else { return };
+            if let Err(error) = draw(warm_up) {
                 // The first frame that uses the pipeline takes longer; nothing else is affected.
-                tracing::debug!("a pipeline was not rehearsed: {error}");
+                tracing::debug!("a pipeline was not warmed up: {error}");
             }
         }))
     }
 }
 
-impl Rehearsal {
+impl WarmUp {
     /// Opens a second device of the adapter.
     fn new(instance: wgpu::Instance, adapter: wgpu::Adapter) -> Result<Self, RenderError> {
         let gpu = Gpu::from_adapter(instance, adapter)?;
         let zeros = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("rehearsal"),
+            label: Some("warm-up"),
             size: ZEROS,
             usage: wgpu::BufferUsages::UNIFORM
                 | wgpu::BufferUsages::STORAGE
@@ -132,7 +132,7 @@ impl Rehearsal {
         let g_buffer = key.variant.has(Feature::Deferred).then(|| self.g_buffer_group());
         let baked_light = match key.variant.samples_lightmap() {
             true => {
-                let (name, encoding) = ("rehearsal".to_owned(), LightmapEncoding::default());
+                let (name, encoding) = ("warm-up".to_owned(), LightmapEncoding::default());
                 let texels = vec![glam::Vec3::ZERO; 16];
                 let image = Arc::new(LightmapImage { name, width: 4, height: 4, texels, encoding });
                 Some(self.sets.lightmap(&self.gpu, &mut self.textures, &Lightmap { image })?)
@@ -162,7 +162,7 @@ impl Rehearsal {
         let map = self.texture(DEPTH_FORMAT, 1);
         let mut encoder = device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("rehearsal"),
+            label: Some("warm-up"),
             depth_stencil_attachment: Some(depth_attachment(&map)),
             ..Default::default()
         });
@@ -187,7 +187,7 @@ impl Rehearsal {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder
             .begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("rehearsal"),
+                label: Some("warm-up"),
                 color_attachments: &[Some(color_attachment(&color))],
                 ..Default::default()
             })
@@ -208,7 +208,7 @@ impl Rehearsal {
 
     fn texture(&self, format: wgpu::TextureFormat, sample_count: u32) -> wgpu::TextureView {
         let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("rehearsal"),
+            label: Some("warm-up"),
             size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count,
@@ -235,7 +235,7 @@ impl Rehearsal {
         let depth = self.texture(DEPTH_FORMAT, key.samples);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("rehearsal"),
+            label: Some("warm-up"),
             color_attachments: &attachments,
             depth_stencil_attachment: Some(depth_attachment(&depth)),
             ..Default::default()
@@ -278,7 +278,7 @@ impl Rehearsal {
         };
         let entries: Vec<_> = bindings.buffers().map(entry).collect();
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("rehearsal"),
+            label: Some("warm-up"),
             layout: &layout,
             entries: &entries,
         })
@@ -295,7 +295,7 @@ impl Rehearsal {
         let atlas = self.texture(DEPTH_FORMAT, 1);
         let table = self.texture(wgpu::TextureFormat::Rgba32Uint, 1);
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("rehearsal"),
+            label: Some("warm-up"),
             layout: self.pipelines.shadow_layout(),
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&atlas) },

@@ -8,9 +8,9 @@ use crate::{EffectError, Gpu};
 
 /// A value that is created once: it is ready, still being created, or has failed.
 #[derive(Debug)]
-pub struct Deferred<T>(Arc<OnceLock<Result<T, EffectError>>>);
+pub struct Pending<T>(Arc<OnceLock<Result<T, EffectError>>>);
 
-impl<T: Send + Sync + 'static> Deferred<T> {
+impl<T: Send + Sync + 'static> Pending<T> {
     /// Starts to create it on the device's worker thread, after the jobs that were queued before.
     pub fn begin(gpu: &Gpu, make: impl FnOnce() -> Result<T, EffectError> + Send + 'static) -> Self {
         let place = Arc::new(OnceLock::new());
