@@ -122,7 +122,8 @@ pub(crate) fn resolution(
     let CoveredTexels { layout, list: texels, contacts, side: texel_side, .. } = texels;
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
-    let mut resolution = Resolution { patch_side: side, form_factor_rays: effort.form_factor_rays };
+    let requested_rays = effort.form_factor_rays(texels.len(), options.error);
+    let mut resolution = Resolution { patch_side: side, form_factor_rays: requested_rays };
     let triangles = scene.triangles.len() as u64;
     let covered = texels.len() as u64;
     let footprint_points = texels.iter().map(|texel| match &texel.footprint {
@@ -140,6 +141,11 @@ pub(crate) fn resolution(
             texel_bytes + triangles * TRIANGLE_BYTES + OTHER_BYTES + exchange_bytes(&resolution, patches);
         report.memory_bytes = needed;
         let Some(limit) = options.memory.filter(|&limit| needed > limit) else { break };
+        if resolution.form_factor_rays > effort.form_factor_rays {
+            // The rays that only a large level gets go first.
+            resolution.form_factor_rays = effort.form_factor_rays;
+            continue;
+        }
         if is_coarsest {
             return Err(BakeError::Memory { needed, texels: texel_bytes, covered, limit });
         }
@@ -151,9 +157,8 @@ pub(crate) fn resolution(
     }
     if resolution.patch_side > side {
         report.warnings.push(format!(
-            "{patches} patches instead of {requested_patches}, and {} form factor rays instead of {}, so that the bake stays within {}",
+            "{patches} patches instead of {requested_patches}, and {} form factor rays instead of {requested_rays}, so that the bake stays within {}",
             resolution.form_factor_rays,
-            effort.form_factor_rays,
             mebibytes(options.memory.unwrap_or_default())
         ));
     }
