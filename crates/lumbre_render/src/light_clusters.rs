@@ -653,28 +653,6 @@ mod tests {
     }
 
     #[test]
-    fn few_clusters_outside_of_a_cone_list_its_light() {
-        let view = view(Projection::perspective(1.0), [640, 360], [0.1, 100.0]);
-        let entries = |cone| {
-            let sphere = BoundingSphere { light: 0, center: DVec3::ZERO, radius: 3.0, cone };
-            let mut clusters = LightClusters::default();
-            clusters.build(&view, [&[sphere], &[]], 1);
-            clusters.entries as f64
-        };
-        let ball = entries(None);
-        for (axis, cosine) in [(DVec3::X, 0.6), (DVec3::NEG_Y, 0.8), (DVec3::new(0.6, 0.0, 0.8), 0.9)] {
-            let cone = ConeReach { axis: axis.as_vec3(), cosine };
-            // Of the volume of its bounding sphere, a cone with its cap takes this part.
-            let cosine = f64::from(cosine);
-            let sine = (1.0 - cosine * cosine).sqrt();
-            let range = if cosine > sine { 2.0 * cosine } else { 1.0 / sine };
-            let volume = 0.5 * (1.0 - cosine) * range.powi(3);
-            let share = entries(Some(cone)) / ball;
-            assert!(share > volume && share < volume + 0.4, "{axis}, {cosine}: {share} of {volume}");
-        }
-    }
-
-    #[test]
     fn lists_that_would_grow_too_long_take_a_coarser_grid() {
         let wide = Projection::Perspective { vertical_fov: 1.2, aspect: None, near: 0.1, far: None };
         let view = view(wide, [1920, 1080], [0.1, 100.0]);
