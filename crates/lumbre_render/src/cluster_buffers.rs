@@ -43,7 +43,12 @@ impl ClusterBuffers {
         self.inverse_square.clear();
         self.ranged.clear();
         for (reach, index) in lights.reaches.iter().zip(0..) {
-            let sphere = |light| BoundingSphere { light, center: reach.center, radius: reach.radius };
+            let sphere = |light| BoundingSphere {
+                light,
+                center: reach.center,
+                radius: reach.radius,
+                cone: reach.cone,
+            };
             match reach.class {
                 LightClass::Unbounded => {}
                 LightClass::InverseSquare => {

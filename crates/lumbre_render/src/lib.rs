@@ -62,6 +62,7 @@ mod irradiance_volumes;
 mod layout;
 mod ledger;
 mod light_clusters;
+mod light_cone;
 mod light_counter;
 mod light_grid;
 mod light_lists;

@@ -3,12 +3,13 @@
 //! range reaches it, and a fragment evaluates only those. The lists are exact, not an approximation: a light
 //! that is missing from a cluster is 0 everywhere in it. They are built on the CPU for every frame in which
 //! something moved. The shader that reads them is shaders/light_clusters.wesl; the lists of whole objects are
-//! in `light_lists`.
+//! in `light_lists`, and what the cone of a spotlight does not touch is found by `light_cone`.
 
 use glam::{DVec3, UVec3};
 
-use crate::extract::{CameraView, ViewVolume};
+use crate::extract::{CameraView, ConeReach, ViewVolume};
 use crate::layout::ClusterGridData;
+use crate::light_cone::ViewCone;
 
 /// Tile sides that are tried, in pixels, finest first. At 32 pixels the lists are short, and the 64-pixel
 /// tiles of a software rasterizer still contain whole tiles. Coarser tiles are for frames in which building
@@ -38,6 +39,8 @@ pub(crate) struct BoundingSphere {
     pub center: DVec3,
     /// In metres, finite.
     pub radius: f64,
+    /// The cone that the light does not leave, if it is a spotlight.
+    pub cone: Option<ConeReach>,
 }
 
 /// The view that a grid is built for.
@@ -70,6 +73,7 @@ pub(crate) struct LightClusters {
     /// Index of a black light of the first class.
     black: u32,
     spheres: Vec<ViewSphere>,
+    cones: Vec<ViewCone>,
     spans: Vec<Span>,
     rows: Vec<Edge>,
     slices: Vec<[f64; 2]>,
@@ -79,11 +83,15 @@ pub(crate) struct LightClusters {
 #[derive(Clone, Copy, Debug)]
 struct ViewSphere {
     light: u32,
+    /// Index of its cone; `NO_CONE` for none.
+    cone: u32,
     x: f64,
     y: f64,
     depth: f64,
     radius: f64,
 }
+
+const NO_CONE: u32 = u32::MAX;
 
 /// A run of clusters of one row that a light reaches.
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +104,7 @@ struct Span {
 /// One screen axis of the grid. A coordinate on it is x (or y) divided by depth in a perspective view, and x
 /// itself otherwise.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+pub(crate) struct Axis {
     first: f64,
     step: f64,
     count: u32,
@@ -129,8 +137,14 @@ impl LightClusters {
     /// class.
     pub fn build(&mut self, view: &ClusteredView, classes: [&[BoundingSphere]; 2], none: u32) {
         self.spheres.clear();
+        self.cones.clear();
         for sphere in classes.into_iter().flatten() {
-            self.spheres.push(ViewSphere::new(view, sphere));
+            let mut in_view = ViewSphere::new(view, sphere);
+            if let Some(cone) = ViewCone::new(view, sphere) {
+                in_view.cone = saturated(self.cones.len());
+                self.cones.push(cone);
+            }
+            self.spheres.push(in_view);
         }
         let (columns, rows, depths) = self.choose(view);
         self.grid.size = UVec3::new(columns.count, rows.count, depths.count);
@@ -232,9 +246,18 @@ impl LightClusters {
                 for row in top..=bottom {
                     let edges = [self.rows[row as usize], self.rows[row as usize + 1]];
                     let Some(in_row) = in_slice.in_row(edges) else { continue };
-                    let Some([left, right]) = columns.span(in_row.x, in_row.depth, in_row.radius) else {
+                    let Some(mut reached) = columns.span(in_row.x, in_row.depth, in_row.radius) else {
                         continue;
                     };
+                    if let Some(cone) = self.cones.get(sphere.cone as usize) {
+                        let depths =
+                            [near.max(sphere.depth - sphere.radius), far.min(sphere.depth + sphere.radius)];
+                        let Some(narrowed) = cone.narrowed(reached, row, [columns, rows], depths) else {
+                            continue;
+                        };
+                        reached = narrowed;
+                    }
+                    let [left, right] = reached;
                     let first = (slice * rows.count + row) * columns.count + left;
                     let count = right - left + 1;
                     self.spans.push(Span { first, count, light: sphere.light });
@@ -301,25 +324,34 @@ fn saturated(count: usize) -> u32 {
     u32::try_from(count).unwrap_or(u32::MAX)
 }
 
-impl ViewSphere {
-    fn new(view: &ClusteredView, sphere: &BoundingSphere) -> Self {
-        let basis = view.view.basis;
-        let from_eye = sphere.center - view.view.eye;
-        let mirrored = match view.view.volume {
+impl ClusteredView {
+    /// Returns a direction of the world in view space: to the right, downwards, along the line of sight.
+    pub fn turned(&self, direction: DVec3) -> DVec3 {
+        let basis = self.view.basis;
+        let mirrored = match self.view.volume {
             ViewVolume::Perspective { .. } => [1.0; 2],
             ViewVolume::Orthographic { half_width, half_height, .. } => {
                 [half_width.signum(), half_height.signum()]
             }
         };
-        let from_origin = (sphere.center - view.origin).length();
-        let margin = RANGE_MARGIN * sphere.radius + DISTANCE_MARGIN * (from_origin + sphere.radius);
-        Self {
-            light: sphere.light,
-            x: from_eye.dot(basis.x_axis) * mirrored[0],
-            y: -from_eye.dot(basis.y_axis) * mirrored[1],
-            depth: -from_eye.dot(basis.z_axis),
-            radius: sphere.radius + margin,
-        }
+        DVec3::new(
+            direction.dot(basis.x_axis) * mirrored[0],
+            -direction.dot(basis.y_axis) * mirrored[1],
+            -direction.dot(basis.z_axis),
+        )
+    }
+}
+
+/// Returns by how much a light's sphere is enlarged, in metres.
+pub(crate) fn margin(view: &ClusteredView, sphere: &BoundingSphere) -> f64 {
+    let from_origin = (sphere.center - view.origin).length();
+    RANGE_MARGIN * sphere.radius + DISTANCE_MARGIN * (from_origin + sphere.radius)
+}
+
+impl ViewSphere {
+    fn new(view: &ClusteredView, sphere: &BoundingSphere) -> Self {
+        let DVec3 { x, y, z: depth } = view.turned(sphere.center - view.view.eye);
+        Self { light: sphere.light, cone: NO_CONE, x, y, depth, radius: sphere.radius + margin(view, sphere) }
     }
 
     /// Returns a sphere around the part of this one that lies in a slice. Its radius is that of the largest
@@ -381,6 +413,16 @@ impl Axis {
             count: view.size[axis].div_ceil(side),
             perspective,
         })
+    }
+
+    /// Returns the middle of a tile at a depth, and how far the tile extends from there at most between
+    /// depths that are `half_depth` away; `far` is the greater of them.
+    pub fn tile(&self, tile: u32, depth: f64, far: f64, half_depth: f64) -> (f64, f64) {
+        let middle = self.first + self.step * (f64::from(tile) + 0.5);
+        match self.perspective {
+            true => (middle * depth, middle.abs() * half_depth + 0.5 * self.step * far),
+            false => (middle, 0.5 * self.step),
+        }
     }
 
     /// Returns the first and the last tile that a sphere reaches.
@@ -525,8 +567,17 @@ mod tests {
         words.flat_map(|word| [word & 0xffff, word >> 16]).filter(|light| *light != clusters.black).collect()
     }
 
+    /// Whether a light reaches a point.
+    fn reaches(sphere: &BoundingSphere, point: DVec3) -> bool {
+        let in_cone = |cone: ConeReach| {
+            let from_apex = point - cone.apex(sphere.center, sphere.radius);
+            from_apex.dot(cone.axis.as_dvec3()) > f64::from(cone.cosine) * from_apex.length()
+        };
+        sphere.center.distance(point) < sphere.radius && sphere.cone.is_none_or(in_cone)
+    }
+
     #[test]
-    fn a_point_within_a_lights_range_finds_it_in_its_cluster() {
+    fn a_point_within_a_lights_reach_finds_it_in_its_cluster() {
         let wide = Projection::Perspective { vertical_fov: 1.2, aspect: None, near: 0.1, far: None };
         let narrow = Projection::Perspective { vertical_fov: 0.4, aspect: None, near: 2.0, far: None };
         let parallel =
@@ -543,10 +594,14 @@ mod tests {
         {
             let mut random = Random(number as u64);
             let view = view(projection, size, [-5.0, 1e3]);
-            let mut sphere = |light| BoundingSphere {
+            let mut sphere = |light: u32| BoundingSphere {
                 light,
                 center: random.place(8.0),
                 radius: if light % 50 == 0 { 1e3 } else { 10.0_f64.powf(random.within(-2.0, 0.5)) },
+                cone: light.is_multiple_of(3).then(|| ConeReach {
+                    axis: random.place(1.0).normalize().as_vec3(),
+                    cosine: random.within(0.0, 1.0) as f32,
+                }),
             };
             let first: Vec<BoundingSphere> = (0..301).map(&mut sphere).collect();
             let second: Vec<BoundingSphere> = (500..600).map(&mut sphere).collect();
@@ -566,9 +621,7 @@ mod tests {
                     let list = list(&clusters, cluster, packed);
                     assert!(list.is_sorted_by(|a, b| a < b), "each once: {list:?}");
                     listed += list.len();
-                    for sphere in
-                        spheres.iter().filter(|sphere| sphere.center.distance(point) < sphere.radius)
-                    {
+                    for sphere in spheres.iter().filter(|sphere| reaches(sphere, point)) {
                         reaching += 1;
                         assert!(
                             list.contains(&sphere.light),
@@ -591,7 +644,7 @@ mod tests {
     #[test]
     fn no_tile_is_finer_than_was_asked_for() {
         let view = view(Projection::perspective(1.0), [640, 360], [0.1, 100.0]);
-        let ball = BoundingSphere { light: 0, center: DVec3::ZERO, radius: 2.0 };
+        let ball = BoundingSphere { light: 0, center: DVec3::ZERO, radius: 2.0, cone: None };
         for (finest_tile, side) in [(0, 32), (32, 32), (100, 128), (256, 256), (u32::MAX, 16384)] {
             let mut clusters = LightClusters::default();
             clusters.build(&ClusteredView { finest_tile, ..view }, [&[ball], &[]], 1);
@@ -603,7 +656,7 @@ mod tests {
     fn lists_that_would_grow_too_long_take_a_coarser_grid() {
         let wide = Projection::Perspective { vertical_fov: 1.2, aspect: None, near: 0.1, far: None };
         let view = view(wide, [1920, 1080], [0.1, 100.0]);
-        let sphere = |light| BoundingSphere { light, center: DVec3::ZERO, radius: 6.0 };
+        let sphere = |light| BoundingSphere { light, center: DVec3::ZERO, radius: 6.0, cone: None };
         let mut clusters = LightClusters::default();
         clusters.build(&view, [&[sphere(0)], &[]], 0);
         assert_eq!(clusters.tile_side, 32);

@@ -108,6 +108,7 @@ mod tests {
                     2 => 1e-6,
                     _ => 1.0 + random(1.0),
                 },
+                cone: None,
                 baked: false,
                 polygon: None,
             })

@@ -156,6 +156,7 @@ mod tests {
             class: LightClass::Ranged,
             center: DVec3::new(x, 0.0, 0.0),
             radius,
+            cone: None,
             baked,
             polygon: None,
         };
@@ -187,6 +188,7 @@ mod tests {
             class: LightClass::Ranged,
             center: DVec3::X * x,
             radius: 1.5,
+            cone: None,
             baked: false,
             polygon: None,
         };
@@ -217,6 +219,7 @@ mod tests {
             class: LightClass::Unbounded,
             center: DVec3::Y * 2.0,
             radius: f64::INFINITY,
+            cone: None,
             baked: false,
             polygon,
         };

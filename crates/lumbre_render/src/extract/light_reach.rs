@@ -57,10 +57,32 @@ pub(crate) struct LightReach {
     pub center: DVec3,
     /// Radius of that sphere in metres; infinite for a light without a range.
     pub radius: f64,
+    /// The cone of a spotlight with a range, whose bounding sphere the sphere is.
+    pub cone: Option<ConeReach>,
     /// Whether it is baked into the lightmaps in use.
     pub baked: bool,
     /// The plane that a polygon light shines from.
     pub polygon: Option<PolygonReach>,
+}
+
+/// The cone that a spotlight does not leave. Its apex follows from its bounding sphere ([`Self::apex`]), so that
+/// it takes little memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ConeReach {
+    /// Unit vector along which it shines, in the world.
+    pub axis: Vec3,
+    /// Cosine of the angle between the axis and the outermost direction, from 0 to 1.
+    pub cosine: f32,
+}
+
+impl ConeReach {
+    /// Returns the place of the light whose cone has this bounding sphere.
+    pub fn apex(&self, center: DVec3, radius: f64) -> DVec3 {
+        let cosine = f64::from(self.cosine);
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let offset = if cosine > sine { radius } else { radius * cosine / sine };
+        center - self.axis.as_dvec3() * offset
+    }
 }
 
 /// Where a polygon light shines: in front of its plane, on everything except the object whose face it is.
@@ -73,17 +95,17 @@ pub(crate) struct PolygonReach {
 
 impl LightReach {
     pub(super) fn new(light: &Light, transform: &GlobalTransform, class: LightClass) -> Self {
-        let (center, radius) = match light.kind {
+        let (center, radius, cone) = match light.kind {
             LightKind::Point => bounding_sphere(light, transform),
-            LightKind::Ambient | LightKind::Directional => (transform.translation(), f64::INFINITY),
+            LightKind::Ambient | LightKind::Directional => (transform.translation(), f64::INFINITY, None),
         };
-        Self { class, center, radius, baked: light.bake == BakeMode::Static, polygon: None }
+        Self { class, center, radius, cone, baked: light.bake == BakeMode::Static, polygon: None }
     }
 
     pub(super) fn of_polygon(EmissivePolygon { light, emitter, baked }: &EmissivePolygon) -> Self {
         let reach = PolygonReach { front: light.area_vector(), emitter: *emitter };
         let (class, center) = (LightClass::Unbounded, light.corner);
-        Self { class, center, radius: f64::INFINITY, baked: *baked, polygon: Some(reach) }
+        Self { class, center, radius: f64::INFINITY, cone: None, baked: *baked, polygon: Some(reach) }
     }
 
     /// Returns true if it may light any part of an object with this bounding box in the world.
@@ -106,21 +128,25 @@ impl PolygonReach {
 }
 
 /// Returns centre and radius of the smallest sphere around everything that a point light reaches: the sphere
-/// of its range, or one around the spotlight's part of that.
-fn bounding_sphere(light: &Light, transform: &GlobalTransform) -> (DVec3, f64) {
+/// of its range, or one around the spotlight's part of that, with the cone.
+fn bounding_sphere(light: &Light, transform: &GlobalTransform) -> (DVec3, f64, Option<ConeReach>) {
     let (place, range) = (transform.translation(), f64::from(light.attenuation.range));
-    let Some(cone) = cone(light).filter(|_| range.is_finite()) else { return (place, range) };
+    let Some(cone) = cone(light).filter(|_| range.is_finite()) else { return (place, range, None) };
     // The device rounds the cosine to f32 and lights only points strictly inside, so a small margin is
     // sufficient.
     let cosine = (cone.cosines().outer - 1e-6).max(0.0);
-    let sine = (1.0 - cosine * cosine).sqrt();
     let axis = transform.forward();
-    match cosine > sine {
+    let cone = ConeReach { axis: axis.as_vec3(), cosine: cosine as f32 };
+    // The rounded cosine, from which the apex is found again.
+    let cosine = f64::from(cone.cosine);
+    let sine = (1.0 - cosine * cosine).sqrt();
+    let (center, radius) = match cosine > sine {
         // Through the apex and the rim of the spherical cap.
         true => (place + axis * (0.5 * range / cosine), 0.5 * range / cosine),
         // Around the rim of the spherical cap.
         false => (place + axis * (range * cosine), range * sine),
-    }
+    };
+    (center, radius, Some(cone))
 }
 
 #[cfg(test)]
@@ -138,8 +164,10 @@ mod tests {
         for outer in [0.01_f32, 0.5, 0.785, 0.786, 1.2, 1.57] {
             let attenuation = Attenuation { range: 4.0, ..Attenuation::INVERSE_SQUARE };
             let cone = SpotCone::Smooth { inner: 0.0, outer };
-            let (center, radius) =
+            let (center, radius, cone) =
                 bounding_sphere(&Light { attenuation, ..Light::spot(Vec3::ONE, cone) }, &place);
+            let apex = cone.map(|cone| cone.apex(center, radius));
+            assert!(apex.is_some_and(|apex| apex.distance(place.translation()) < 1e-6), "{outer}: {apex:?}");
             // The farthest points are the apex, the middle of the cap and its rim.
             let rim = |angle: f64| axis * angle.cos() + side * angle.sin();
             let outer = f64::from(outer);

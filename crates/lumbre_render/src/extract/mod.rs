@@ -18,7 +18,7 @@ pub(crate) use camera::{CameraView, ViewVolume, Window, find_camera};
 pub(crate) use emitters::Emitters;
 #[cfg(test)]
 pub(crate) use light_reach::PolygonReach;
-pub(crate) use light_reach::{LightClass, LightReach};
+pub(crate) use light_reach::{ConeReach, LightClass, LightReach};
 pub(crate) use light_records::LightRecords;
 pub(crate) use lights::{
     KnownLights, Lamp, LightCounts, LightPlace, LightSet, SceneLights, UNIFORM_LIGHTS, extract_lights,
