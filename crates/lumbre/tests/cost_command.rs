@@ -36,7 +36,11 @@ fn a_small_report_and_what_changed_since() {
     let asked = ["cost", "-o", text(&report), "--quick", "--study", "reflection", "--size", "24x16"];
     let output = lumbre(&asked);
     assert!(output.status.success(), "{}", stderr(&output));
-    assert!(stdout(&output).contains("Reflection models beside Phong's (12 points"), "{}", stdout(&output));
+    assert!(
+        stdout(&output).contains("Reflection models compared with Phong's (12 points"),
+        "{}",
+        stdout(&output)
+    );
     assert!(stdout(&output).trim_end().ends_with("index.html"), "{}", stdout(&output));
     assert!(stderr(&output).contains("lumbre: reflection: "), "{}", stderr(&output));
     let found = read_report(&report).unwrap();
@@ -225,7 +229,7 @@ fn a_level_with_the_settings_that_keep_a_time() {
     // No settings are this fast, so nothing is written.
     let output = tune(["--frame-ms", "0.000001"]);
     assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
-    assert!(stdout(&output).contains("Nothing keeps within"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("No settings keep within"), "{}", stdout(&output));
     assert!(!tuned.exists());
 
     // All settings are this accurate: the fastest is chosen, whichever it is on this machine, and the file

@@ -9,7 +9,7 @@ use glam::{DVec3, UVec3};
 
 use crate::extract::{CameraView, ConeReach, ViewVolume};
 use crate::layout::ClusterGridData;
-use crate::light_cone::ViewCone;
+use crate::light_cone::LightCone;
 
 /// Tile sides that are tried, in pixels, finest first. At 32 pixels the lists are short, and the 64-pixel
 /// tiles of a software rasterizer still contain whole tiles. Coarser tiles are for frames in which building
@@ -93,6 +93,14 @@ struct ViewSphere {
 
 const NO_CONE: u32 = u32::MAX;
 
+/// The cone of a spotlight in view space.
+#[derive(Clone, Copy, Debug)]
+struct ViewCone {
+    cone: LightCone,
+    /// By how much spheres are enlarged that are tested, in metres, for the rounding of the light's place.
+    margin: f64,
+}
+
 /// A run of clusters of one row that a light reaches.
 #[derive(Clone, Copy, Debug)]
 struct Span {
@@ -104,7 +112,7 @@ struct Span {
 /// One screen axis of the grid. A coordinate on it is x (or y) divided by depth in a perspective view, and x
 /// itself otherwise.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Axis {
+struct Axis {
     first: f64,
     step: f64,
     count: u32,
@@ -326,7 +334,7 @@ fn saturated(count: usize) -> u32 {
 
 impl ClusteredView {
     /// Returns a direction of the world in view space: to the right, downwards, along the line of sight.
-    pub fn turned(&self, direction: DVec3) -> DVec3 {
+    fn turned(&self, direction: DVec3) -> DVec3 {
         let basis = self.view.basis;
         let mirrored = match self.view.volume {
             ViewVolume::Perspective { .. } => [1.0; 2],
@@ -343,9 +351,50 @@ impl ClusteredView {
 }
 
 /// Returns by how much a light's sphere is enlarged, in metres.
-pub(crate) fn margin(view: &ClusteredView, sphere: &BoundingSphere) -> f64 {
+fn margin(view: &ClusteredView, sphere: &BoundingSphere) -> f64 {
     let from_origin = (sphere.center - view.origin).length();
     RANGE_MARGIN * sphere.radius + DISTANCE_MARGIN * (from_origin + sphere.radius)
+}
+
+impl ViewCone {
+    /// Returns the cone of a light; `None` if it has none.
+    fn new(view: &ClusteredView, sphere: &BoundingSphere) -> Option<Self> {
+        let cone = sphere.cone?;
+        let apex = cone.apex(sphere.center, sphere.radius);
+        let axis = view.turned(cone.axis.as_dvec3());
+        let cone = LightCone::new(view.turned(apex - view.view.eye), axis, f64::from(cone.cosine));
+        Some(Self { cone, margin: margin(view, sphere) })
+    }
+
+    /// Returns a run of columns in a row of a slice without the clusters at its ends that the cone does not
+    /// touch; `None` if it touches none. `depths` are those of the slice, as far as the light reaches. A
+    /// cluster is tested by the sphere around it.
+    fn narrowed(
+        &self,
+        [mut left, mut right]: [u32; 2],
+        row: u32,
+        [columns, rows]: [&Axis; 2],
+        [near, far]: [f64; 2],
+    ) -> Option<[u32; 2]> {
+        let half_depth = 0.5 * (far - near);
+        let depth = near + half_depth;
+        let (y, half_height) = rows.tile(row, depth, far, half_depth);
+        let touches = |column: u32| {
+            let (x, half_width) = columns.tile(column, depth, far, half_depth);
+            let half_size = DVec3::new(half_width, half_height, half_depth);
+            self.cone.touches(DVec3::new(x, y, depth), half_size.length() + self.margin)
+        };
+        while !touches(left) {
+            left += 1;
+            if left > right {
+                return None;
+            }
+        }
+        while !touches(right) {
+            right -= 1;
+        }
+        Some([left, right])
+    }
 }
 
 impl ViewSphere {
@@ -417,7 +466,7 @@ impl Axis {
 
     /// Returns the middle of a tile at a depth, and how far the tile extends from there at most between
     /// depths that are `half_depth` away; `far` is the greater of them.
-    pub fn tile(&self, tile: u32, depth: f64, far: f64, half_depth: f64) -> (f64, f64) {
+    fn tile(&self, tile: u32, depth: f64, far: f64, half_depth: f64) -> (f64, f64) {
         let middle = self.first + self.step * (f64::from(tile) + 0.5);
         match self.perspective {
             true => (middle * depth, middle.abs() * half_depth + 0.5 * self.step * far),
