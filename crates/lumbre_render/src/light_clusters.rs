@@ -646,7 +646,7 @@ mod tests {
             let mut sphere = |light: u32| BoundingSphere {
                 light,
                 center: random.place(8.0),
-                radius: if light % 50 == 0 { 1e3 } else { 10.0_f64.powf(random.within(-2.0, 0.5)) },
+                radius: if light.is_multiple_of(50) { 1e3 } else { 10.0_f64.powf(random.within(-2.0, 0.5)) },
                 cone: light.is_multiple_of(3).then(|| ConeReach {
                     axis: random.place(1.0).normalize().as_vec3(),
                     cosine: random.within(0.0, 1.0) as f32,
