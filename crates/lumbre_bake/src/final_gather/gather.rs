@@ -136,8 +136,7 @@ impl RadianceCache<'_> {
         for (replicate, sample) in tags {
             let [x, y, u, v] = sequences[replicate].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
-                let patch = self.patches.at(point.triangle, Side::Front, point.at);
-                let region = patch.and_then(|patch| self.guide.region_of(patch));
+                let region = self.guide.region_at(point.triangle, Side::Front, point.at);
                 let request = GatherRequest { receiver: receiver(self.scene, &point), region, u, v };
                 batches.samples.push(request, (replicate, sample));
             }
@@ -178,7 +177,7 @@ impl RadianceCache<'_> {
             let last = self.read(receiver, hit, &sequences[replicate], sample, contribution);
             if let Some(last) = last.filter(|_| contribution.is_checked) {
                 let [u, v, ..] = sequences[replicate].point(sample, 1);
-                let region = self.guide.region_of(last.patch);
+                let region = self.guide.region_at(last.triangle, last.side, last.at);
                 let request = GatherRequest { receiver: self.receiver_at(&last), region, u, v };
                 checks.push(request, (slot, last.patch));
             }

@@ -8,7 +8,8 @@ use glam::{Vec2, Vec3};
 
 use super::radiance_cache::RadianceCache;
 use crate::radiosity::patch_index::PatchIndex;
-use crate::radiosity::sampling_guide::{GuidedPatch, Region, RowPart};
+use crate::radiosity::patches::Patch;
+use crate::radiosity::sampling_guide::{Region, RowPart};
 use crate::sampling::{cosine_about, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{Receiver, SurfaceHit};
@@ -99,9 +100,9 @@ impl IncidentSample {
 pub(crate) enum SampleTarget {
     /// In a direction, cosine-distributed about the receiver's normal.
     Direction(Vec3),
-    /// To a point that the guide chose with this density, per square canonical unit: the hit if nothing is in between,
-    /// and the point just off its surface.
-    Point(f32, Hit, Vec3),
+    /// To a point of a region that the guide chose with this probability: the hit if nothing is in between, and the
+    /// point just off its surface.
+    Point(Region, f32, Hit, Vec3),
     /// The guide's point cannot light the receiver.
     Nowhere,
 }
@@ -114,6 +115,8 @@ pub(crate) struct SamplePath {
     guided_share: Option<f32>,
     /// Part of the guide's row that is searched next.
     row_part: RowPart,
+    /// The region that was hit, if the guide knows the receiver.
+    region: Option<Region>,
     /// The texel that was hit, its direct light and its mean reflectance; both NaN where it has none.
     texel: MapTexel,
     direct: Vec3,
@@ -126,6 +129,7 @@ impl SamplePath {
         target: SampleTarget::Nowhere,
         guided_share: None,
         row_part: RowPart::NONE,
+        region: None,
         texel: MapTexel::NONE,
         direct: Vec3::ZERO,
         reflectance: Vec3::ZERO,
@@ -181,13 +185,16 @@ impl RadianceCache<'_> {
         for (path, result) in paths.iter_mut().zip(results.iter_mut()) {
             path.texel = MapTexel::NONE;
             let Some(hit) = &mut result.hit else { continue };
-            if let SampleTarget::Direction(_) = path.target {
-                let Some(patch) = self.patches.at(hit.triangle, hit.side, hit.at) else {
-                    *result = IncidentSample::NOTHING;
-                    continue;
-                };
-                hit.patch = patch;
-            }
+            let Some(patch) = self.patches.at(hit.triangle, hit.side, hit.at) else {
+                *result = IncidentSample::NOTHING;
+                continue;
+            };
+            path.region = match path.target {
+                SampleTarget::Point(region, ..) => Some(region),
+                _ if path.guided_share.is_some() => self.guide.region_at(hit.triangle, hit.side, hit.at),
+                _ => None,
+            };
+            hit.patch = patch;
             path.texel = self.texel_at(hit.triangle, hit.side, hit.at);
         }
         for path in paths.iter_mut() {
@@ -210,10 +217,10 @@ impl RadianceCache<'_> {
                     hit.error = self.patch_error[hit.patch.place()];
                 }
             }
-            if let (SampleTarget::Direction(_), Some(region), Some(_)) =
-                (&path.target, request.region, path.guided_share)
+            if let (SampleTarget::Direction(_), Some(receiver_region), Some(region)) =
+                (&path.target, request.region, path.region)
             {
-                path.row_part = self.guide.near_patch(region, hit.patch);
+                path.row_part = self.guide.near_region(receiver_region, region);
             }
         }
         for ((path, request), result) in paths.iter().zip(requests).zip(results) {
@@ -240,7 +247,9 @@ impl RadianceCache<'_> {
             }
             Some(share) => {
                 let picked = self.guide.pick(&path.row_part, u / share);
-                let point = picked.and_then(|patch| self.point_of(receiver, patch, v));
+                let point = picked.and_then(|(region, u, probability)| {
+                    self.region_point(receiver, region, probability, u, v)
+                });
                 point.unwrap_or(SampleTarget::Nowhere)
             }
         };
@@ -253,7 +262,7 @@ impl RadianceCache<'_> {
         let origin = request.receiver.origin;
         match &path.target {
             SampleTarget::Nowhere => {}
-            SampleTarget::Point(_, hit, end) => {
+            SampleTarget::Point(_, _, hit, end) => {
                 if !self.scene.blocked(origin, *end) {
                     result.hit = Some(*hit);
                     result.weight = 1.0;
@@ -279,11 +288,13 @@ impl RadianceCache<'_> {
     /// The weight of a sample where the guide places this share of the samples; `None` for a sample that cannot count.
     #[inline]
     fn weight(&self, request: &GatherRequest, path: &SamplePath, share: f32, hit: &Hit) -> Option<f32> {
-        // Densities per area of the surface that was hit.
-        let by_guide = match path.target {
-            SampleTarget::Point(density, ..) => density,
-            _ => self.guide.density(&path.row_part, hit.patch),
+        let region = path.region?;
+        let probability = match path.target {
+            SampleTarget::Point(_, probability, ..) => probability,
+            _ => self.guide.probability(&path.row_part, region),
         };
+        // Densities per area of the surface that was hit.
+        let by_guide = probability / self.guide.region(region).area;
         let normal = self.scene.triangles[hit.triangle as usize].side_normal(hit.side);
         let cosine = -hit.direction.dot(normal);
         let by_cosine =
@@ -292,13 +303,18 @@ impl RadianceCache<'_> {
         (cosine > 0.0 && weight.is_finite()).then_some(weight)
     }
 
-    /// A point of a patch that the guide chose as a target, if it and the receiver face each other.
+    /// A point of a region as a target, if it and the receiver face each other.
     #[inline]
-    fn point_of(&self, receiver: &Receiver, guided: GuidedPatch, v: f32) -> Option<SampleTarget> {
-        let GuidedPatch { patch, u, density } = guided;
-        let chosen = &self.patches.list[patch.place()];
-        let (triangle, side) = (chosen.triangle, chosen.side);
-        let at = self.patches.point(chosen, triangle_point(u, v));
+    fn region_point(
+        &self,
+        receiver: &Receiver,
+        region: Region,
+        probability: f32,
+        u: f32,
+        v: f32,
+    ) -> Option<SampleTarget> {
+        let Patch { triangle, side, .. } = *self.guide.region(region);
+        let at = self.guide.point(region, triangle_point(u, v));
         let surface = &self.scene.triangles[triangle as usize];
         let position = surface.position(at.0, at.1);
         let offset = position - receiver.position;
@@ -310,8 +326,8 @@ impl RadianceCache<'_> {
             return None;
         }
         let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
-        let hit = Hit { triangle, side, at, patch, direction, distance, ..Hit::UNREAD };
-        Some(SampleTarget::Point(density, hit, end))
+        let hit = Hit { triangle, side, at, direction, distance, ..Hit::UNREAD };
+        Some(SampleTarget::Point(region, probability, hit, end))
     }
 
     /// The receiver at the surface that was hit.
