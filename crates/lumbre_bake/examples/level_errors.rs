@@ -1,6 +1,6 @@
 //! Measures the errors of baked levels in the region that a player sees: `level_errors [NAME|FILE.glb …] [--error X]
 //! [--time SECONDS] [--seed N] [--texels-per-meter N] [--points N] [--cache FOLDER] [--reference] [--anew|--paths]
-//! [--flip] [--pictures FOLDER] [--stages]`.
+//! [--flip] [--pictures FOLDER] [--stages] [--no-denoise] [--no-seams] [--patch-texels N]`.
 //!
 //! It bakes each level (all of them if none is named) and prints one row for it: errors at reference points away from
 //! shadow edges, relative to the light around a point. The reference points are read from the cache or from the tests'
