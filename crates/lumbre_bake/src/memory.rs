@@ -25,21 +25,21 @@ const TRIANGLE_BYTES: u64 =
     (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32) as u64;
 
 /// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
-/// round, raw and smoothed estimates with their guides, sixteen lists of one number each for the errors, the light
-/// around it, and its block. (The sums of the shared samples of direct light need less, and are freed by then.)
+/// round, raw and smoothed estimates with their guides, sixteen lists of one number each for the errors, its chart, the
+/// light around it, and its block. (The sums of the shared samples of direct light need less, and are freed by then.)
 const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + size_of::<Direct>()
     + 2 * size_of::<GatherSums>()
     + 2 * size_of::<Estimates>()
     + 24
     + 16 * 4
-    + 3 * 4) as u64;
+    + 4 * 4) as u64;
 
 /// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later:
 /// estimates with their bias, the numbers of the weighted fit, guides with the noise, products, and nearness. Besides,
-/// its place among the covered texels and its surface, and for rays that hit it, its reflectance and the light of the
-/// previous round with its error.
-const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + 4 * (3 + 3 + 1 + 2);
+/// its place among the covered texels and its surface, and for rays that hit it, its reflectance, whether its direct
+/// light is steep, and the light of the previous round with its error.
+const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + 4 * (3 + 3 + 1 + 2) + 1;
 
 /// Per texel of a map, for separate maps of direct and bounced light: both as computed, as filled, and as divided.
 const SEPARATE_LIGHT_BYTES: u64 = 6 * 12;
@@ -64,9 +64,10 @@ const PATCH_BYTES: u64 = (size_of::<Patch>() + 4 * 12 + 6 * 24 + 3 * 16 * 8 + 4)
 /// the half.
 const FORM_FACTOR_RAY_BYTES: u64 = 2 * 8 + 8 + 2 * 8 + 2 * 8 + 8;
 
-/// Per patch, for the sampling guide: the number of its region, its place in the region's list, its exitance, and at
-/// worst a region of its own, with its cut, the heads of its list and row, its brightness and its exchange.
-const GUIDED_PATCH_BYTES: u64 = (4 + 8 + 4 + size_of::<Patch>() + 16 + 24 + 16 + 8 + 8) as u64;
+/// Per patch, for the sampling guide: the number of its region, its place in the region's list, its exitance, its
+/// probability and its density in the region, and at worst a region of its own, with its cut, the heads of its lists
+/// and row, its brightness and its exchange.
+const GUIDED_PATCH_BYTES: u64 = (4 + 8 + 4 + 8 + 8 + size_of::<Patch>() + 16 + 28 + 16 + 8 + 8) as u64;
 
 /// Per form factor ray, for the sampling guide: two pairs of regions, each an index and a probability, in lists that
 /// may have grown to twice their length.
@@ -122,7 +123,8 @@ pub(crate) fn resolution(
     let CoveredTexels { layout, list: texels, contacts, side: texel_side, .. } = texels;
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
-    let mut resolution = Resolution { patch_side: side, form_factor_rays: effort.form_factor_rays };
+    let requested_rays = effort.form_factor_rays(texels.len(), options.error);
+    let mut resolution = Resolution { patch_side: side, form_factor_rays: requested_rays };
     let triangles = scene.triangles.len() as u64;
     let covered = texels.len() as u64;
     let footprint_points = texels.iter().map(|texel| match &texel.footprint {
@@ -140,6 +142,11 @@ pub(crate) fn resolution(
             texel_bytes + triangles * TRIANGLE_BYTES + OTHER_BYTES + exchange_bytes(&resolution, patches);
         report.memory_bytes = needed;
         let Some(limit) = options.memory.filter(|&limit| needed > limit) else { break };
+        if resolution.form_factor_rays > effort.form_factor_rays {
+            // The rays that only a large level gets go first.
+            resolution.form_factor_rays = effort.form_factor_rays;
+            continue;
+        }
         if is_coarsest {
             return Err(BakeError::Memory { needed, texels: texel_bytes, covered, limit });
         }
@@ -151,9 +158,8 @@ pub(crate) fn resolution(
     }
     if resolution.patch_side > side {
         report.warnings.push(format!(
-            "{patches} patches instead of {requested_patches}, and {} form factor rays instead of {}, so that the bake stays within {}",
+            "{patches} patches instead of {requested_patches}, and {} form factor rays instead of {requested_rays}, so that the bake stays within {}",
             resolution.form_factor_rays,
-            effort.form_factor_rays,
             mebibytes(options.memory.unwrap_or_default())
         ));
     }

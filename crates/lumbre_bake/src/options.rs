@@ -154,8 +154,12 @@ impl Default for BakeOptions {
 pub(crate) struct Effort {
     /// Most patches that the surface area is divided into. There may be more, as every triangle has at least one.
     pub patches: usize,
-    /// Rays for all form factors together.
+    /// Rays for all form factors together, at least.
     pub form_factor_rays: usize,
+    /// The same per texel of the level and per inverse of the requested error, where that makes more, up to four times
+    /// as many: the gather of a large level to a small error casts far more rays than these, and needs fewer the better
+    /// its guide is.
+    pub form_factor_rays_per_texel: f64,
     /// Smallest side of a patch, in texels.
     pub patch_texels: f32,
     /// Shadow samples per texel: in the first pass, in the pass over suspected penumbrae, and at most.
@@ -180,6 +184,7 @@ impl Quality {
             Self::Draft => Effort {
                 patches: 3_000,
                 form_factor_rays: 600_000,
+                form_factor_rays_per_texel: 0.0,
                 patch_texels: 6.0,
                 direct: [4, 16, 16],
                 shared: [8, 64],
@@ -189,6 +194,7 @@ impl Quality {
             Self::Final => Effort {
                 patches: 8_000,
                 form_factor_rays: 1_500_000,
+                form_factor_rays_per_texel: 0.08,
                 patch_texels: 4.0,
                 direct: [8, 64, 1024],
                 shared: [8, 1024],
@@ -198,6 +204,7 @@ impl Quality {
             Self::Reference => Effort {
                 patches: 40_000,
                 form_factor_rays: 20_000_000,
+                form_factor_rays_per_texel: 0.0,
                 patch_texels: 2.0,
                 direct: [64, 1024, 4096],
                 shared: [256, 8192],
@@ -209,11 +216,20 @@ impl Quality {
 }
 
 impl Effort {
+    /// Rays for all form factors of a level with so many `texels`, for a requested `error`.
+    pub fn form_factor_rays(&self, texels: usize, error: f64) -> usize {
+        let by_texels = self.form_factor_rays_per_texel * texels as f64 / error;
+        (by_texels as usize).clamp(self.form_factor_rays, MAX_MORE_FORM_FACTOR_RAYS * self.form_factor_rays)
+    }
+
     /// Most samples of all `texels` together.
     pub fn budget(&self, texels: u64) -> u64 {
         (texels * u64::from(self.mean)).max(SMALL_BUDGET)
     }
 }
+
+/// Limit of the form factor rays by the number of texels, as a multiple of their least number.
+const MAX_MORE_FORM_FACTOR_RAYS: usize = 4;
 
 /// Rays that every bake may take, however few texels it has: they take only seconds.
 const SMALL_BUDGET: u64 = 32_000_000;
@@ -231,6 +247,7 @@ impl BakeOptions {
             effort.gather[0] = (effort.gather[0] / 2).max(4);
             effort.patches = effort.patches.min(4_000);
             effort.form_factor_rays = effort.form_factor_rays.min(500_000);
+            effort.form_factor_rays_per_texel = 0.0;
             effort.direct[1] = effort.direct[1].min(16);
         }
         effort

@@ -41,6 +41,8 @@ pub(crate) enum Stream {
     LocalLight,
     /// Shadow rays to sources that share samples, by replicate.
     SharedLight(u32),
+    /// Shadow rays at what rays of the final gather hit, by replicate.
+    SteepLight(u32),
     #[cfg(test)]
     Test(u32),
 }
@@ -64,6 +66,7 @@ impl Stream {
             Self::ChangedTexels => 61,
             Self::LocalLight => 80,
             Self::SharedLight(replicate) => 96 + replicate,
+            Self::SteepLight(replicate) => 112 + replicate,
             #[cfg(test)]
             Self::Test(number) => number,
         }

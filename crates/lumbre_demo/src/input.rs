@@ -9,52 +9,42 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct Input {
     /// Walk in the direction of the view.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "is_default")]
     pub forward: bool,
     /// Walk backwards.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "is_default")]
     pub back: bool,
     /// Walk sideways to the left.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "is_default")]
     pub left: bool,
     /// Walk sideways to the right.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "is_default")]
     pub right: bool,
     /// Run instead of walking.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "is_default")]
     pub run: bool,
     /// Jump, or rise while flying.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "is_default")]
     pub jump: bool,
     /// Sink while flying.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "is_default")]
     pub sink: bool,
     /// Rotation of the view in radians, as the mouse moves: x to the right, y downwards.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_default")]
     pub look: DVec2,
     /// Rotation around the target of the view in radians, as the mouse moves: x to the right, y downwards.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_default")]
     pub orbit: DVec2,
     /// Shift of the picture as a fraction of its height, as the mouse moves: x to the right, y downwards.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_default")]
     pub pan: DVec2,
     /// Notches of the mouse wheel; positive zooms in.
-    #[serde(skip_serializing_if = "is_still")]
+    #[serde(skip_serializing_if = "is_default")]
     pub zoom: f64,
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
-fn is_false(value: &bool) -> bool {
-    !*value
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
-fn is_still(value: &f64) -> bool {
-    *value == 0.0
-}
-
-fn is_zero(value: &DVec2) -> bool {
-    *value == DVec2::ZERO
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 impl Input {

@@ -267,7 +267,7 @@ impl Drawn {
 }
 
 /// Fewest rounds: with fewer, the spread would be meaningless.
-const FEWEST_ROUNDS: usize = 5;
+const MIN_ROUNDS: usize = 5;
 /// Most rounds: variations over a longer time come from the machine's load.
 const MAX_ROUNDS: usize = 101;
 
@@ -301,7 +301,7 @@ pub fn effect_costs<E: From<RenderError>>(
     }
     let begun = Instant::now();
     let mut rounds: Vec<Vec<f64>> = Vec::new();
-    while rounds.len() < FEWEST_ROUNDS || (begun.elapsed() < time && rounds.len() < MAX_ROUNDS) {
+    while rounds.len() < MIN_ROUNDS || (begun.elapsed() < time && rounds.len() < MAX_ROUNDS) {
         rounds.push(frames.iter_mut().map(|frame| frame.milliseconds(&target)).collect::<Result<_, _>>()?);
     }
 

@@ -218,6 +218,11 @@ fn instances_are_nodes() {
     assert_eq!(found, vec![Quadric::sphere(1.0); 3]);
     assert!(report.notes.iter().all(|note| !note.text.contains("LUMBRE_quadric")), "{:?}", report.notes);
 
+    // All instances cannot have the light of one map.
+    let mut baked = instanced(&[0.0; 9], &[0.0, 0.0, 0.0, 1.0].repeat(3));
+    baked.root["nodes"][0]["extensions"]["LUMBRE_lightmap"] = json!({"image": "light.exr"});
+    let (_, report) = baked.load().unwrap();
+    assert!(report.notes.iter().any(|note| note.text.contains("bake the file again")), "{:?}", report.notes);
     let problem = instanced(&[0.0; 9], &[0., 0., 0., 1.]).problem().to_string();
     assert!(
         problem.contains("nodes[0] (instanced): EXT_mesh_gpu_instancing.ROTATION")

@@ -28,7 +28,7 @@ pub(crate) const PASS: u32 = 4;
 /// Passes of every pixel before a standard error is trusted, since two passes may agree by chance. The noise
 /// of these passes also decides the distribution of
 /// [`sample_by_noise`](crate::TraceOptions::sample_by_noise).
-const FEWEST_PASSES: u32 = 8;
+const MIN_PASSES: u32 = 8;
 
 /// The state that all passes of one picture share.
 pub(crate) struct Rendering<'a> {
@@ -99,14 +99,14 @@ impl<'a> Rendering<'a> {
         let mut kept = Instant::now();
         let ended = loop {
             let error = state.film.relative_error();
-            let believed = state.round >= FEWEST_PASSES;
+            let believed = state.round >= MIN_PASSES;
             if believed && options.error.zip(error).is_some_and(|(wanted, error)| error <= wanted) {
                 break Ended::Error;
             }
             if state.round >= rounds {
                 break Ended::Complete;
             }
-            if options.sample_by_noise && state.round == FEWEST_PASSES && state.distribution.is_none() {
+            if options.sample_by_noise && state.round == MIN_PASSES && state.distribution.is_none() {
                 state.distribution = Some(SampleDistribution::of(&state.film));
             }
             if kept.elapsed() >= keeper.interval() {
@@ -121,7 +121,7 @@ impl<'a> Rendering<'a> {
             let distribution = &state.distribution;
             let ended = self.pass(&mut state.film, share, before, |at, pixel| {
                 let wanted = match distribution {
-                    Some(distribution) => distribution.passes(at, FEWEST_PASSES, round + 1),
+                    Some(distribution) => distribution.passes(at, MIN_PASSES, round + 1),
                     None => round + 1,
                 };
                 (has[at]..wanted).map(|pass| estimator.pixel(pixel, pass, PASS)).collect()

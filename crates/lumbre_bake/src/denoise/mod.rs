@@ -2,6 +2,7 @@
 //! samples come from is of no concern here.
 
 pub(crate) mod box_sums;
+pub(crate) mod conserve_light;
 pub(crate) mod filter_features;
 pub(crate) mod filter_pass;
 pub(crate) mod kernel;

@@ -18,6 +18,9 @@ pub(crate) struct Neighbourhoods<'a> {
     /// For each texel of all maps, its index among the covered ones; [`NONE`] if it is not covered, or hidden.
     covered: Vec<u32>,
     grid: TexelRows,
+    /// For each covered texel, the number of its chart within its group; [`NONE`] for hidden ones.
+    pub charts: Vec<u32>,
+    pub chart_count: usize,
     /// The first row of each map in the grid.
     first_rows: Vec<usize>,
     /// The first texel of each row, as an index into all maps.
@@ -38,6 +41,8 @@ impl<'a> Neighbourhoods<'a> {
         let mut numbers: HashMap<(u32, [u32; 3], u32), u32> = HashMap::new();
         let mut covered = vec![NONE; layout.texels];
         let mut texel_surfaces = vec![NONE; layout.texels];
+        let mut chart_numbers: HashMap<(u32, u32), u32> = HashMap::new();
+        let mut texel_charts = vec![NONE; texels.len()];
         for (index, texel) in open_texels(texels) {
             let (chart, normal) =
                 (charts[texel.triangle as usize], scene.triangles[texel.triangle as usize].normal);
@@ -47,6 +52,8 @@ impl<'a> Neighbourhoods<'a> {
                 surfaces.push(Surface { chart, normal, group });
                 surfaces.len() as u32 - 1
             });
+            let next_chart = chart_numbers.len() as u32;
+            texel_charts[index.place()] = *chart_numbers.entry((chart, group)).or_insert(next_chart);
             covered[texel.index.place()] = index.0;
             texel_surfaces[texel.index.place()] = surface;
         }
@@ -58,7 +65,8 @@ impl<'a> Neighbourhoods<'a> {
             first_rows.push(row_starts.len());
             row_starts.extend((0..map.height as usize).map(|row| map.first + row * map.width as usize));
         }
-        Self { scene, texels, covered, grid, first_rows, row_starts }
+        let (charts, chart_count) = (texel_charts, chart_numbers.len());
+        Self { scene, texels, covered, grid, charts, chart_count, first_rows, row_starts }
     }
 
     /// Length of a texel's side on its surface, canonical units.

@@ -8,6 +8,7 @@ use fearless_simd::{Select, Simd, f32x8, prelude::*};
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::conserve_light::conserve_light;
 use super::filter_features::{
     FEATURES, Features, NOISE, NOISE_STEPS, Variances, center_values, sum_of_variances,
 };
@@ -50,7 +51,9 @@ pub(crate) fn smooth(
         let smoothed = std::array::from_fn(|replicate| Vec3::from_slice(&values[3 * replicate..]));
         if texel.is_hidden() { (*estimates, 0.0) } else { (smoothed, values[BIAS]) }
     });
-    results.unzip()
+    let (mut smoothed, biases): (Vec<Estimates>, Vec<f32>) = results.unzip();
+    conserve_light(neighbourhoods, estimates, &mut smoothed);
+    (smoothed, biases)
 }
 
 /// Both passes, in place. `distances_and_sides` holds the inverse distances and the texels' side lengths.

@@ -39,6 +39,40 @@ struct LocalBias {
     later: f32,
 }
 
+/// How much of what is not known of the patches' bias remains in the texels that rays of later rounds have read, over
+/// the whole level: it becomes less with every round, as each reads the texels of the one before.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TexelReads {
+    /// Mean reflectance of the level's surfaces, below 1.
+    reflectance: f64,
+    /// Samples that have read texels, and the sum over them of the share that remained in what they read.
+    samples: f64,
+    rest: f64,
+}
+
+impl TexelReads {
+    /// Before the first round. Of texels that the `reused` samples of a former bake have read, nothing is known: the
+    /// whole rest counts.
+    pub fn new(reflectance: f64, reused: &[GatherSums]) -> Self {
+        let samples: f64 = reused.iter().map(|sums| f64::from(sums.texel_reads)).sum();
+        Self { reflectance, samples, rest: samples }
+    }
+
+    /// Adds the samples of a round, which reads texels of which each still contains the share `rest`.
+    pub fn add(&mut self, samples: f64, rest: f64) {
+        self.samples += samples;
+        self.rest += samples * rest;
+    }
+
+    /// The share of the rest that remains in a texel, in [0, 1]: with a share s of its samples that read patches, it is
+    /// s + (1 - s) ρ r, where r remained in the texels that were read.
+    pub fn rest_in(&self, gathered: &GatherSums) -> f64 {
+        let texel_share = gathered.texel_share();
+        let read = if self.samples > 0.0 { self.rest / self.samples } else { 1.0 };
+        1.0 - texel_share * (1.0 - self.reflectance * read)
+    }
+}
+
 /// The wider neighbourhood over which squares of the unknown part are pooled: steps each way, and texels of a step.
 const WIDER_STEPS: usize = 2;
 const WIDER_STEP: usize = 4;
@@ -107,16 +141,16 @@ impl Checks {
 ///
 /// The real bounces read patches too, one bounce later: of a difference d they leave about d ρ/(1 - ρ), with the
 /// scene's mean reflectance ρ. Samples that read a texel are not checked: that texel is itself a mean of samples that
-/// were, and so one bounce later; d has been subtracted from it, and ρ times the rest remains. Where a share s of a
-/// texel's samples read patches, s d is subtracted, and the rest counts s + (1 - s) ρ times.
+/// were, and so one bounce later; d has been subtracted from it, and ρ times the rest that was in it remains. Where a
+/// share s of a texel's samples read patches, s d is subtracted, and the rest counts as [`TexelReads`] says.
 pub(crate) fn patch_bias(
     neighbourhoods: &Neighbourhoods<'_>,
     texels: &[Texel],
     gathered: &[GatherSums],
     raw: &[Estimates],
-    reflectance: f64,
+    reads: &TexelReads,
 ) -> Vec<PatchBias> {
-    let later_bounces = reflectance / (1.0 - reflectance);
+    let later_bounces = reads.reflectance / (1.0 - reads.reflectance);
     let maps = texels.iter().map(|texel| texel.object as usize + 1).max().unwrap_or(0);
     let mut map_checks = vec![Checks::default(); maps];
     let texel_checks: Vec<Checks> =
@@ -147,7 +181,7 @@ pub(crate) fn patch_bias(
         let correction = if correction.is_finite() { correction } else { DVec3::ZERO };
         let later = later_bounces.powi(2) * square(correction);
         let patch_share = 1.0 - sums.texel_share();
-        let remaining = (patch_share + (1.0 - patch_share) * reflectance).powi(2);
+        let remaining = reads.rest_in(sums).powi(2);
         LocalBias {
             correction: (patch_share * correction).as_vec3(),
             unknown: (remaining * unknown) as f32,
@@ -171,4 +205,28 @@ pub(crate) fn patch_bias(
         }
     };
     sums.into_par_iter().zip(&local).map(pooled).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_round_leaves_less_of_the_patches_bias() {
+        let of_texel =
+            |samples: u32, texel_reads: u32| GatherSums { samples, texel_reads, ..GatherSums::default() };
+        let first = of_texel(4, 0);
+        let mut reads = TexelReads::new(0.5, &[first]);
+        assert_eq!(reads.rest_in(&first), 1.0, "all samples read patches");
+        // Half of the samples read texels of which all the bias is left.
+        reads.add(4.0, 1.0);
+        let second = of_texel(8, 16);
+        assert_eq!(reads.rest_in(&second), 0.75);
+        // Three quarters of what was read by then contains 0.75 of it.
+        reads.add(12.0, 0.75);
+        let third = of_texel(16, 64);
+        assert_eq!(reads.rest_in(&third), 0.5 * (0.25 + 0.75 * 0.75));
+        let reused = TexelReads::new(0.5, &[second]);
+        assert_eq!(reused.rest_in(&third), 0.5, "nothing is known of what a former bake read");
+    }
 }

@@ -15,7 +15,7 @@ use super::radiance_cache::RadianceCache;
 use crate::coverage::footprint::{Texel, receiver};
 use crate::coverage::tile_sequence::TileSequence;
 use crate::radiosity::patch_index::PatchIndex;
-use crate::sampling::Stream;
+use crate::sampling::{Sequence, Stream};
 use crate::scene::Receiver;
 use crate::scene::material::Side;
 
@@ -136,15 +136,16 @@ impl RadianceCache<'_> {
         for (replicate, sample) in tags {
             let [x, y, u, v] = sequences[replicate].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
-                let region = self.guide.region_at(point.triangle, Side::Front, point.at);
+                let patch = self.patches.at(point.triangle, Side::Front, point.at);
+                let region = patch.and_then(|patch| self.guide.region_of(patch));
                 let request = GatherRequest { receiver: receiver(self.scene, &point), region, u, v };
                 batches.samples.push(request, (replicate, sample));
             }
             if batches.samples.count == BATCH {
-                self.gather_batch(texel, &sequences, batches, gathered);
+                self.gather_batch(texel, &sequences, seed, batches, gathered);
             }
         }
-        self.gather_batch(texel, &sequences, batches, gathered);
+        self.gather_batch(texel, &sequences, seed, batches, gathered);
         gathered.samples = first.max(samples);
     }
 
@@ -153,20 +154,27 @@ impl RadianceCache<'_> {
         &self,
         texel: &Texel,
         sequences: &[TileSequence; REPLICATES],
+        seed: u32,
         Batches { samples, contributions, checks }: &mut Batches,
         gathered: &mut GatherSums,
     ) {
         samples.follow(self);
         checks.count = 0;
         let tags = &samples.tags[..samples.count];
-        for (slot, (incident, &(replicate, sample))) in samples.results.iter().zip(tags).enumerate() {
+        for (slot, (incident, &(replicate, sample))) in samples.results.iter_mut().zip(tags).enumerate() {
             let contribution = &mut contributions[slot];
             *contribution = GatherContribution {
                 light: incident.light,
                 weight: incident.weight,
                 ..GatherContribution::NONE
             };
-            let Some(hit) = &incident.hit else { continue };
+            let Some(hit) = &mut incident.hit else { continue };
+            if hit.is_steep {
+                let sequence = Sequence::new(seed, Stream::SteepLight(replicate as u32), texel.index.0);
+                let (direct, rays) = self.direct_light_at(hit, sequence.of(sample));
+                hit.direct = direct;
+                contribution.rays += rays;
+            }
             gathered.inverse_distances += incident.weight / hit.distance.max(f32::MIN_POSITIVE);
             // Takes turns over replicates, samples and texels: every neighbourhood gets checks, however few samples
             // there are.
@@ -177,7 +185,7 @@ impl RadianceCache<'_> {
             let last = self.read(receiver, hit, &sequences[replicate], sample, contribution);
             if let Some(last) = last.filter(|_| contribution.is_checked) {
                 let [u, v, ..] = sequences[replicate].point(sample, 1);
-                let region = self.guide.region_at(last.triangle, last.side, last.at);
+                let region = self.guide.region_of(last.patch);
                 let request = GatherRequest { receiver: self.receiver_at(&last), region, u, v };
                 checks.push(request, (slot, last.patch));
             }

@@ -8,8 +8,7 @@ use glam::{Vec2, Vec3};
 
 use super::radiance_cache::RadianceCache;
 use crate::radiosity::patch_index::PatchIndex;
-use crate::radiosity::patches::Patch;
-use crate::radiosity::sampling_guide::{Region, RowPart};
+use crate::radiosity::sampling_guide::{GuidedPatch, Region, RowPart};
 use crate::sampling::{cosine_about, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{Receiver, SurfaceHit};
@@ -52,6 +51,8 @@ pub(crate) struct Hit {
     /// Irradiance there: direct, and by bounces as the texel or the patch has it.
     pub direct: Vec3,
     pub indirect: Vec3,
+    /// Whether `direct` changes so much over the texel that it does not hold for the point.
+    pub is_steep: bool,
     /// The patches' errors in `indirect`, each with its sign.
     pub error: Vec2,
     /// The squared error of `indirect` where it is that of a texel gathered in an earlier round; `None` where it is the
@@ -72,6 +73,7 @@ impl Hit {
         reflectance: Vec3::ZERO,
         direct: Vec3::ZERO,
         indirect: Vec3::ZERO,
+        is_steep: false,
         error: Vec2::ZERO,
         variance: None,
         direction: Vec3::ZERO,
@@ -100,9 +102,9 @@ impl IncidentSample {
 pub(crate) enum SampleTarget {
     /// In a direction, cosine-distributed about the receiver's normal.
     Direction(Vec3),
-    /// To a point of a region that the guide chose with this probability: the hit if nothing is in between, and the
-    /// point just off its surface.
-    Point(Region, f32, Hit, Vec3),
+    /// To a point that the guide chose with this density, per square canonical unit: the hit if nothing is in between,
+    /// and the point just off its surface.
+    Point(f32, Hit, Vec3),
     /// The guide's point cannot light the receiver.
     Nowhere,
 }
@@ -115,12 +117,11 @@ pub(crate) struct SamplePath {
     guided_share: Option<f32>,
     /// Part of the guide's row that is searched next.
     row_part: RowPart,
-    /// The region that was hit, if the guide knows the receiver.
-    region: Option<Region>,
     /// The texel that was hit, its direct light and its mean reflectance; both NaN where it has none.
     texel: MapTexel,
     direct: Vec3,
     reflectance: Vec3,
+    is_steep: bool,
 }
 
 impl SamplePath {
@@ -129,10 +130,10 @@ impl SamplePath {
         target: SampleTarget::Nowhere,
         guided_share: None,
         row_part: RowPart::NONE,
-        region: None,
         texel: MapTexel::NONE,
         direct: Vec3::ZERO,
         reflectance: Vec3::ZERO,
+        is_steep: false,
     };
 }
 
@@ -185,21 +186,19 @@ impl RadianceCache<'_> {
         for (path, result) in paths.iter_mut().zip(results.iter_mut()) {
             path.texel = MapTexel::NONE;
             let Some(hit) = &mut result.hit else { continue };
-            let Some(patch) = self.patches.at(hit.triangle, hit.side, hit.at) else {
-                *result = IncidentSample::NOTHING;
-                continue;
-            };
-            path.region = match path.target {
-                SampleTarget::Point(region, ..) => Some(region),
-                _ if path.guided_share.is_some() => self.guide.region_at(hit.triangle, hit.side, hit.at),
-                _ => None,
-            };
-            hit.patch = patch;
+            if let SampleTarget::Direction(_) = path.target {
+                let Some(patch) = self.patches.at(hit.triangle, hit.side, hit.at) else {
+                    *result = IncidentSample::NOTHING;
+                    continue;
+                };
+                hit.patch = patch;
+            }
             path.texel = self.texel_at(hit.triangle, hit.side, hit.at);
         }
         for path in paths.iter_mut() {
             path.direct = self.direct.get(path.texel.place()).copied().unwrap_or(Vec3::NAN);
             path.reflectance = self.reflectance.get(path.texel.place()).copied().unwrap_or(Vec3::NAN);
+            path.is_steep = self.steep.get(path.texel.place()).copied().unwrap_or(false);
         }
         for ((path, request), result) in paths.iter_mut().zip(requests).zip(results.iter_mut()) {
             let Some(hit) = &mut result.hit else { continue };
@@ -217,14 +216,15 @@ impl RadianceCache<'_> {
                     hit.error = self.patch_error[hit.patch.place()];
                 }
             }
-            if let (SampleTarget::Direction(_), Some(receiver_region), Some(region)) =
-                (&path.target, request.region, path.region)
+            if let (SampleTarget::Direction(_), Some(region), Some(_)) =
+                (&path.target, request.region, path.guided_share)
             {
-                path.row_part = self.guide.near_region(receiver_region, region);
+                path.row_part = self.guide.near_patch(region, hit.patch);
             }
         }
         for ((path, request), result) in paths.iter().zip(requests).zip(results) {
             let Some(hit) = &mut result.hit else { continue };
+            hit.is_steep = path.is_steep;
             hit.direct =
                 if path.direct.x.is_nan() { self.patch_direct[hit.patch.place()] } else { path.direct };
             if let Some(share) = path.guided_share {
@@ -247,9 +247,7 @@ impl RadianceCache<'_> {
             }
             Some(share) => {
                 let picked = self.guide.pick(&path.row_part, u / share);
-                let point = picked.and_then(|(region, u, probability)| {
-                    self.region_point(receiver, region, probability, u, v)
-                });
+                let point = picked.and_then(|patch| self.point_of(receiver, patch, v));
                 point.unwrap_or(SampleTarget::Nowhere)
             }
         };
@@ -262,7 +260,7 @@ impl RadianceCache<'_> {
         let origin = request.receiver.origin;
         match &path.target {
             SampleTarget::Nowhere => {}
-            SampleTarget::Point(_, _, hit, end) => {
+            SampleTarget::Point(_, hit, end) => {
                 if !self.scene.blocked(origin, *end) {
                     result.hit = Some(*hit);
                     result.weight = 1.0;
@@ -288,13 +286,11 @@ impl RadianceCache<'_> {
     /// The weight of a sample where the guide places this share of the samples; `None` for a sample that cannot count.
     #[inline]
     fn weight(&self, request: &GatherRequest, path: &SamplePath, share: f32, hit: &Hit) -> Option<f32> {
-        let region = path.region?;
-        let probability = match path.target {
-            SampleTarget::Point(_, probability, ..) => probability,
-            _ => self.guide.probability(&path.row_part, region),
-        };
         // Densities per area of the surface that was hit.
-        let by_guide = probability / self.guide.region(region).area;
+        let by_guide = match path.target {
+            SampleTarget::Point(density, ..) => density,
+            _ => self.guide.density(&path.row_part, hit.patch),
+        };
         let normal = self.scene.triangles[hit.triangle as usize].side_normal(hit.side);
         let cosine = -hit.direction.dot(normal);
         let by_cosine =
@@ -303,18 +299,13 @@ impl RadianceCache<'_> {
         (cosine > 0.0 && weight.is_finite()).then_some(weight)
     }
 
-    /// A point of a region as a target, if it and the receiver face each other.
+    /// A point of a patch that the guide chose as a target, if it and the receiver face each other.
     #[inline]
-    fn region_point(
-        &self,
-        receiver: &Receiver,
-        region: Region,
-        probability: f32,
-        u: f32,
-        v: f32,
-    ) -> Option<SampleTarget> {
-        let Patch { triangle, side, .. } = *self.guide.region(region);
-        let at = self.guide.point(region, triangle_point(u, v));
+    fn point_of(&self, receiver: &Receiver, guided: GuidedPatch, v: f32) -> Option<SampleTarget> {
+        let GuidedPatch { patch, u, density } = guided;
+        let chosen = &self.patches.list[patch.place()];
+        let (triangle, side) = (chosen.triangle, chosen.side);
+        let at = self.patches.point(chosen, triangle_point(u, v));
         let surface = &self.scene.triangles[triangle as usize];
         let position = surface.position(at.0, at.1);
         let offset = position - receiver.position;
@@ -326,8 +317,8 @@ impl RadianceCache<'_> {
             return None;
         }
         let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
-        let hit = Hit { triangle, side, at, direction, distance, ..Hit::UNREAD };
-        Some(SampleTarget::Point(region, probability, hit, end))
+        let hit = Hit { triangle, side, at, patch, direction, distance, ..Hit::UNREAD };
+        Some(SampleTarget::Point(density, hit, end))
     }
 
     /// The receiver at the surface that was hit.

@@ -12,4 +12,5 @@ pub(crate) mod patch_fallback;
 pub(crate) mod radiance_cache;
 pub(crate) mod reused_gather;
 pub(crate) mod rounds;
+pub(crate) mod steep_light;
 pub(crate) mod texel_radiance;

@@ -3,6 +3,7 @@
 
 use glam::{Vec2, Vec3};
 
+use super::steep_light::steep_texels;
 use super::texel_radiance::{GatheredLight, mean_reflectances};
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::denoise::replicates::REPLICATES;
@@ -20,11 +21,14 @@ use crate::{BakeError, BakeOptions};
 /// The light that leaves surfaces, for rays to read.
 pub(crate) struct RadianceCache<'a> {
     pub scene: &'a BakeScene,
+    pub sources: &'a Sources<'a>,
     pub layout: &'a LightmapLayout,
     pub patches: &'a Patches,
     /// Per texel of all maps, direct irradiance (mixed lights included); NaN where a texel shows nothing, and where a
     /// wall divides it.
     pub direct: Vec<Vec3>,
+    /// Per texel of all maps, whether direct light changes so much over it that `direct` does not hold for a point.
+    pub steep: Vec<bool>,
     /// Irradiance of a surface under an unoccluded sky, W/m².
     pub sky: Vec3,
     /// Per patch, direct irradiance, for points whose texel has none.
@@ -67,10 +71,11 @@ impl<'a> RadianceCache<'a> {
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
         let (scene, effort) = (sources.scene, options.effort());
-        let mut direct = direct.by_place(texels);
+        let mut direct_by_place = direct.by_place(texels);
+        let steep = steep_texels(texels, &direct_by_place, &direct.local);
         // Its one value, a mean of both sides of the wall, would be wrong on either.
         for texel in &texels.divided {
-            direct[texels.list[texel.place()].index.place()] = Vec3::NAN;
+            direct_by_place[texels.list[texel.place()].index.place()] = Vec3::NAN;
         }
         let reflectance = monitor.run_interruptible(0.0, || {
             mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list)
@@ -80,9 +85,11 @@ impl<'a> RadianceCache<'a> {
             correlation_radius: CORRELATED_TEXELS * texels.side,
             reflectance,
             scene,
+            sources,
             layout: texels.layout,
             patches: &exchange.patches,
-            direct,
+            direct: direct_by_place,
+            steep,
             sky: sources.sky,
             patch_direct: &exchange.direct,
             patch_indirect: &exchange.indirect,

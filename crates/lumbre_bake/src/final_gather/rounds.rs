@@ -5,7 +5,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::error_estimate::{PatchBias, patch_bias};
+use super::error_estimate::{PatchBias, TexelReads, patch_bias};
 use super::error_ledger::{ErrorLedger, GatherErrors, open_sum};
 use super::gather_sums::GatherSums;
 use super::map_error::MapError;
@@ -52,8 +52,11 @@ const MAX_REDUCTION: f64 = 8.0;
 /// The quality's rays count as spent if those left are less than this fraction of those cast: so few are not worth
 /// another smoothing.
 const MIN_ROUND: f64 = 0.15;
-/// The gather ends after a round that left more than this fraction of the squared error that it was to reduce.
+/// A round has stalled if it left more than this fraction of the squared error that it was to reduce.
 const STALLED: f64 = 0.95;
+/// The gather ends after so many stalled rounds in a row. One alone says little: where much of the light comes through
+/// a gap that few rays find, the first rounds find out only how noisy it is.
+const MAX_STALLED_ROUNDS: u32 = 2;
 /// As [`STALLED`], for a small step, which is not expected to reduce the error by much.
 const SMALL_STEP_STALLED: f64 = 0.995;
 
@@ -108,14 +111,17 @@ pub(crate) fn gather(
     monitor.pass(ROUND_PROGRESS);
     let mut in_time = cast_first_round(cache, list, wanted, &mut gathered, options, monitor)?;
     let mut plan: Option<RoundPlan> = None;
+    let mut stalled_rounds = 0;
+    let mut reads = TexelReads::new(cache.patches.mean_reflectance(), &gathered);
     let result = loop {
-        let result = planner.evaluate(&gathered, cache.patches.mean_reflectance(), monitor, report)?;
+        let result = planner.evaluate(&gathered, &reads, monitor, report)?;
         let is_late = !in_time || monitor.clock().is_over();
         let next = planner.plan(&gathered, &result);
         let is_hardly_reducible = next.reducible_error <= MIN_REDUCIBLE * result.relative_squares;
         let has_stalled = plan.as_ref().is_some_and(|plan| plan.has_stalled(next.reducible_error));
+        stalled_rounds = if has_stalled { stalled_rounds + 1 } else { 0 };
         report.ended = Ended::after(report.error_reached, is_late || monitor.is_late(), next.is_last);
-        let rays_gain_nothing = is_hardly_reducible || has_stalled;
+        let rays_gain_nothing = is_hardly_reducible || stalled_rounds == MAX_STALLED_ROUNDS;
         if report.error_reached || is_late || rays_gain_nothing || is_all_reused || next.is_last {
             break result;
         }
@@ -124,6 +130,8 @@ pub(crate) fn gather(
             GatheredLight::new(list, &gathered, &result.light, variances, &cache.direct)
         })?;
         monitor.pass(ROUND_PROGRESS);
+        let rest = planner.open.iter().map(|texel| reads.rest_in(&gathered[texel.place()])).sum::<f64>();
+        reads.add(next.samples(&gathered), rest / planner.count());
         in_time = cast(cache, list, &next.wanted, &mut gathered, options, monitor)?;
         plan = Some(next);
     };
@@ -179,6 +187,14 @@ struct RoundPlan {
 }
 
 impl RoundPlan {
+    /// How many samples of each replicate are to be added to what has been `gathered`.
+    fn samples(&self, gathered: &[GatherSums]) -> f64 {
+        let added = |allocation: &SampleAllocation| {
+            f64::from(allocation.samples) - f64::from(gathered[allocation.texel.place()].samples)
+        };
+        self.wanted.iter().map(added).sum()
+    }
+
     /// Returns true if the round that followed this plan hardly reduced the error: `left` is its reducible error
     /// afterwards.
     fn has_stalled(&self, left: f64) -> bool {
@@ -227,7 +243,7 @@ impl<'a> RoundPlanner<'a> {
     fn evaluate(
         &self,
         gathered: &[GatherSums],
-        reflectance: f64,
+        reads: &TexelReads,
         monitor: &mut BakeMonitor<'_>,
         report: &mut BakeReport,
     ) -> Result<RoundResult, BakeError> {
@@ -240,8 +256,8 @@ impl<'a> RoundPlanner<'a> {
             }
             false => (raw.clone(), vec![0.0; texels.len()]),
         })?;
-        let patches = monitor
-            .run_interruptible(1.0, || patch_bias(neighbourhoods, texels, gathered, &raw, reflectance))?;
+        let patches =
+            monitor.run_interruptible(1.0, || patch_bias(neighbourhoods, texels, gathered, &raw, reads))?;
         let noise = monitor.run_interruptible(1.0, || spread(neighbourhoods, &estimates))?;
         let bounced = estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>();
         let total = self.mean_direct + bounced / self.count();

@@ -1,28 +1,59 @@
 //! Importance sampling by the radiosity solution: it knows where the light that arrives at a surface comes from, and
 //! the final gather sends a share of its samples there (Ureña and Torres, "Improved Irradiance Computation by
-//! Importance Sampling", 1997). Regions of several patches are sampled, since with few rays a single patch's form
-//! factors are noisy, and often 0 for a patch that does give light. The samples are taken in `final_gather`.
+//! Importance Sampling", 1997). A sample chooses a region of several patches first, since with few rays a single
+//! patch's form factors are noisy, and often 0 for a patch that does give light; then one of the region's patches by
+//! how much light leaves each, so that a beam of sunlight in a dark region is found. The samples are taken in
+//! `final_gather`.
 
 use glam::Vec3;
 
 use super::form_factors::FormFactors;
 use super::larger_patches::LargerPatches;
 use super::patch_index::PatchIndex;
-use super::patches::{Patch, Patches};
+use super::patches::Patches;
 use crate::scene::BakeScene;
-use crate::scene::material::Side;
 
 /// A region of the guide, by its place among all regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Region(u32);
 
 /// For each region, the regions that light it by bounces, with probabilities in proportion to the irradiance that they
-/// contribute.
+/// contribute; and for each region its patches, with probabilities in proportion to the light that leaves them.
 #[derive(Clone, Debug)]
 pub(crate) struct SamplingGuide {
-    /// Made as patches are, but larger.
-    regions: Patches,
     rows: Rows,
+    /// The patches of all regions, one region after the other.
+    members: Vec<Member>,
+    /// Where each region's patches begin in that list, and at last the list's length.
+    first_members: Vec<u32>,
+    /// Per patch, how it is chosen within its region.
+    patches: Vec<PatchInRegion>,
+}
+
+/// A patch of a region, and the sum of the probabilities of the region's patches up to and including it; the last sum
+/// is 1.
+#[derive(Clone, Copy, Debug)]
+struct Member {
+    patch: PatchIndex,
+    end: f32,
+}
+
+/// The region of a patch, and the density with which a sample of that region chooses a point of the patch, per square
+/// canonical unit.
+#[derive(Clone, Copy, Debug)]
+struct PatchInRegion {
+    region: Region,
+    density: f32,
+}
+
+/// A patch that the guide has chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct GuidedPatch {
+    pub patch: PatchIndex,
+    /// The place of the sample's number in the patch's interval, stretched to [0, 1).
+    pub u: f32,
+    /// The density of a point of the patch, per square canonical unit.
+    pub density: f32,
 }
 
 /// Largest share of the samples that the guide places. It is smaller where the sky contributes, which the guide does
@@ -33,6 +64,9 @@ const SHARE_STEPS: f32 = 8.0;
 
 /// Patches along a region's side.
 const REGION_SIDE: f32 = 4.0;
+
+/// A patch counts as giving off at least this share of its region's mean, as its light may be known too roughly.
+const MIN_RADIOSITY: f64 = 0.1;
 
 impl SamplingGuide {
     /// From the patches (of `side` canonical units), their form factors, the radiosity of each and its irradiance by
@@ -46,17 +80,18 @@ impl SamplingGuide {
         sky: &[Vec3],
     ) -> Self {
         let Some(larger) = LargerPatches::new(scene, patches, REGION_SIDE * side) else {
-            return Self { regions: Patches::outlines(scene, REGION_SIDE * side), rows: Rows::new(0) };
+            return Self::empty();
         };
-        let mean_radiosity = |region: usize| -> f64 {
-            let area = larger.patches.list[region].area;
-            let of_member = |member: &PatchIndex| {
-                let share = patches.list[member.place()].area / area;
-                f64::from(radiosity[member.place()].max(0.0) * share)
-            };
-            larger.members[region].iter().map(of_member).sum()
-        };
-        let radiosity_of_regions: Vec<f64> = (0..larger.members.len()).map(mean_radiosity).collect();
+        let area = |member: &PatchIndex| f64::from(patches.list[member.place()].area);
+        let power = |member: &PatchIndex| f64::from(radiosity[member.place()].max(0.0)) * area(member);
+        let radiosity_of_regions: Vec<f64> = larger
+            .members
+            .iter()
+            .map(|members| {
+                let total = members.iter().map(area).sum::<f64>().max(f64::MIN_POSITIVE);
+                members.iter().map(power).sum::<f64>() / total
+            })
+            .collect();
         let share_and_row = |members: &[PatchIndex], exchange: Vec<(PatchIndex, f64)>| {
             let flux: Vec<(u32, f64)> = exchange
                 .into_iter()
@@ -79,23 +114,49 @@ impl SamplingGuide {
         let mut rows = Rows::new(distributions.len());
         rows.entries.reserve_exact(distributions.iter().map(|(_, row)| row.len()).sum());
         distributions.into_iter().for_each(|(share, row)| rows.push(share, &row));
-        let regions = larger.patches;
-        Self { regions, rows }
+        let mut guide = Self {
+            rows,
+            members: Vec::with_capacity(patches.list.len()),
+            patches: larger
+                .of
+                .iter()
+                .map(|region| PatchInRegion { region: Region(region.0), density: 0.0 })
+                .collect(),
+            ..Self::empty()
+        };
+        for (members, mean) in larger.members.iter().zip(&radiosity_of_regions) {
+            let weight = |member: &PatchIndex| power(member).max(MIN_RADIOSITY * mean * area(member));
+            guide.push_members(members, weight, area);
+        }
+        guide
     }
 
-    /// The region at a point of a triangle's side; `None` where no light is received.
-    pub fn region_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> Option<Region> {
-        self.regions.at(triangle, side, at).map(|region| Region(region.0))
+    /// Knows nothing of any patch.
+    fn empty() -> Self {
+        Self { rows: Rows::new(0), members: Vec::new(), first_members: vec![0], patches: Vec::new() }
     }
 
-    /// The surface of a region.
-    pub fn region(&self, region: Region) -> &Patch {
-        &self.regions.list[region.0 as usize]
+    /// Appends the patches of the next region, each chosen in proportion to its weight.
+    fn push_members(
+        &mut self,
+        members: &[PatchIndex],
+        weight: impl Fn(&PatchIndex) -> f64,
+        area: impl Fn(&PatchIndex) -> f64,
+    ) {
+        let weights: Vec<(u32, f64)> = members.iter().map(|member| (member.0, weight(member))).collect();
+        let mut start = 0.0;
+        for Entry { column, end } in cumulative(weights) {
+            let patch = PatchIndex(column);
+            self.patches[patch.place()].density = ((f64::from(end) - f64::from(start)) / area(&patch)) as f32;
+            self.members.push(Member { patch, end });
+            start = end;
+        }
+        self.first_members.push(self.members.len() as u32);
     }
 
-    /// Converts barycentric weights in a region to those in its triangle, both of the second and third vertex.
-    pub fn point(&self, region: Region, at: (f32, f32)) -> (f32, f32) {
-        self.regions.point(self.region(region), at)
+    /// The region of a patch; `None` if the guide knows nothing of it.
+    pub fn region_of(&self, patch: PatchIndex) -> Option<Region> {
+        self.patches.get(patch.place()).map(|patch| patch.region)
     }
 
     /// The share of the samples at a region that the guide places, in [0, 1); `None` if according to the solution no
@@ -109,22 +170,30 @@ impl SamplingGuide {
         self.rows.near(region.0, u)
     }
 
-    /// Samples a region at `u` from a distribution, given the `part` that [`near`](Self::near) returned. Returns the
-    /// region, the place of `u` in its interval, stretched to [0, 1), and its probability.
-    pub fn pick(&self, part: &RowPart, u: f32) -> Option<(Region, f32, f32)> {
+    /// Samples a patch at `u` from a distribution, given the `part` that [`near`](Self::near) returned.
+    pub fn pick(&self, part: &RowPart, u: f32) -> Option<GuidedPatch> {
         let (region, u, probability) = self.rows.pick(part, u)?;
-        Some((Region(region), u, probability))
+        let range =
+            self.first_members[region as usize] as usize..self.first_members[region as usize + 1] as usize;
+        let members = &self.members[range];
+        let place = members.partition_point(|member| member.end <= u);
+        let &Member { patch, end } = members.get(place)?;
+        let start = if place == 0 { 0.0 } else { members[place - 1].end };
+        let u = ((u - start) / (end - start)).clamp(0.0, 1.0 - f32::EPSILON);
+        Some(GuidedPatch { patch, u, density: probability * self.patches[patch.place()].density })
     }
 
-    /// Where to search for `other` in the distribution of the regions that light `region`.
-    pub fn near_region(&self, region: Region, other: Region) -> RowPart {
+    /// Where to search for the region of `patch` in the distribution of the regions that light `region`.
+    pub fn near_patch(&self, region: Region, patch: PatchIndex) -> RowPart {
+        let other = self.patches[patch.place()].region;
         self.rows.near_column(region.0, other.0)
     }
 
-    /// The probability that [`pick`](Self::pick) returns `other`, given the `part` that
-    /// [`near_region`](Self::near_region) returned.
-    pub fn probability(&self, part: &RowPart, other: Region) -> f32 {
-        self.rows.probability(part, other.0)
+    /// The density with which [`pick`](Self::pick) leads to a point of `patch`, per square canonical unit, given the
+    /// `part` that [`near_patch`](Self::near_patch) returned.
+    pub fn density(&self, part: &RowPart, patch: PatchIndex) -> f32 {
+        let PatchInRegion { region, density } = self.patches[patch.place()];
+        self.rows.probability(part, region.0) * density
     }
 }
 
@@ -309,6 +378,36 @@ mod tests {
         let rows = rows();
         assert_eq!([0, 1, 2].map(|row| rows.share(row)), [Some(0.4), None, Some(0.25)]);
         assert_eq!(pick(&rows, 1, 0.5), None);
+    }
+
+    #[test]
+    fn patches_are_chosen_by_the_light_that_leaves_them() {
+        // Two regions: patches 0 to 2 of unequal light and area, and patch 3.
+        let (weights, areas) = ([1.0, 0.0, 3.0, 1.0], [1.0, 1.0, 2.0, 4.0]);
+        let patches = [0, 0, 0, 1].map(|region| PatchInRegion { region: Region(region), density: 0.0 });
+        let mut rows = Rows::new(2);
+        rows.push(0.4, &cumulative(vec![(0, 3.0), (1, 1.0)]));
+        let mut guide = SamplingGuide { rows, patches: patches.to_vec(), ..SamplingGuide::empty() };
+        for members in [&[PatchIndex(0), PatchIndex(1), PatchIndex(2)][..], &[PatchIndex(3)]] {
+            let of = |numbers: [f64; 4]| move |member: &PatchIndex| numbers[member.place()];
+            guide.push_members(members, of(weights), of(areas));
+        }
+        let region = guide.region_of(PatchIndex(0)).unwrap();
+        for (patch, probability) in [(0, 0.1875), (1, 0.0), (2, 0.5625), (3, 0.25)] {
+            let patch = PatchIndex(patch);
+            let density = guide.density(&guide.near_patch(region, patch), patch);
+            assert_eq!(f64::from(density) * areas[patch.place()], probability, "{patch:?}");
+        }
+        let mut picked = [0; 4];
+        for step in 0..1600 {
+            let u = step as f32 / 1600.0;
+            let guided = guide.pick(&guide.near(region, u), u).unwrap();
+            assert!((0.0..1.0).contains(&guided.u));
+            assert_eq!(guided.density, guide.density(&guide.near_patch(region, guided.patch), guided.patch));
+            picked[guided.patch.place()] += 1;
+        }
+        assert_eq!(picked, [300, 0, 900, 400]);
+        assert_eq!(guide.region_of(PatchIndex(4)), None);
     }
 
     #[test]

@@ -66,8 +66,16 @@ pub(crate) fn reused_gather(
 ) -> Result<ReusedGather, BakeError> {
     let change =
         monitor.run_interruptible(1.0, || IndirectChange::new(sources, changes, texels, &direct.texels))?;
-    let of_patches = change.of_patches(exchange, factors, options, monitor)?;
-    let reused = change.keep(exchange, &of_patches, &texels.list, &direct.local, options, monitor)?;
+    let unknown = if changes.nothing_changed { Vec::new() } else { change.unknown_backs(&exchange.patches) };
+    let light = PatchLight {
+        patches: &exchange.patches,
+        exitance: &exchange.exitance,
+        change: &[],
+        unknown: &unknown,
+    };
+    let of_patches = change.of_patches(light, factors, options, monitor)?;
+    let light = PatchLight { change: &of_patches, ..light };
+    let reused = change.keep(light, &texels.list, &direct.local, options, monitor)?;
     report.rays += change.rays(&of_patches);
     Ok(reused)
 }
@@ -136,7 +144,7 @@ impl<'a> IndirectChange<'a> {
     /// are not negative, so that bounds of S give bounds of Δ.
     fn of_patches(
         &self,
-        exchange: &Exchange,
+        light: PatchLight<'_>,
         factors: &FormFactors,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
@@ -144,10 +152,7 @@ impl<'a> IndirectChange<'a> {
         if self.changes.nothing_changed {
             return Ok(Vec::new());
         }
-        let Exchange { patches, exitance, .. } = exchange;
-        let solver = options.solver;
-        let unknown = self.unknown_backs(patches);
-        let light = PatchLight { patches, exitance, change: &[], unknown: &unknown };
+        let (patches, solver) = (light.patches, options.solver);
         let is_new = |patch: &Patch| {
             self.changes.changed[self.scene.triangles[patch.triangle as usize].object as usize]
         };
@@ -210,8 +215,7 @@ impl<'a> IndirectChange<'a> {
     /// Chooses what is kept of the light by bounces.
     fn keep(
         &self,
-        exchange: &Exchange,
-        of_patches: &[Range],
+        light: PatchLight<'_>,
         texels: &[Texel],
         local: &LocalLight,
         options: &BakeOptions,
@@ -220,9 +224,6 @@ impl<'a> IndirectChange<'a> {
         if self.changes.nothing_changed {
             return Ok(choice::keep_all(self.changes));
         }
-        let Exchange { patches, exitance, .. } = exchange;
-        let unknown = self.unknown_backs(patches);
-        let light = PatchLight { patches, exitance, change: of_patches, unknown: &unknown };
         let change = self.of_texels(texels, light, options, monitor)?;
         Ok(choice::choose(self.changes, texels, &change, local, options.error))
     }

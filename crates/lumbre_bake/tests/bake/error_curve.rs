@@ -11,7 +11,7 @@ use lumbre_optics::{Light, Material};
 use crate::corner::corner;
 
 fn baked(world: &mut World, error: f64) -> BakeReport {
-    let options = BakeOptions { density: Density::MapSize(24), error, ..BakeOptions::default() };
+    let options = BakeOptions { density: Density::MapSize(48), error, ..BakeOptions::default() };
     Bake::new(&options).run(world).unwrap()
 }
 
@@ -47,7 +47,7 @@ fn the_curve_advances_and_ends_at_the_reported_error() {
     assert_parts_add_up(&coarse);
     assert!(fine.error_parts.iter().any(|part| part.what == "noise of the final gather"), "{fine}");
     assert!(fine.curve.len() >= 3 && coarse.curve.len() == 2, "{:?} {:?}", fine.curve, coarse.curve);
-    assert!(fine.curve[0].error > fine.estimated_error);
+    assert!(fine.curve[0].error > fine.estimated_error, "{fine}");
 }
 
 #[test]

@@ -47,6 +47,12 @@ pub(crate) fn expand(
         if !custom.is_empty() {
             notes.add(&name, format!("{} of its instances are not used", custom.join(", ")));
         }
+        if node.extensions.contains_key(LIGHTMAP) {
+            notes.add(
+                &name,
+                "has one LUMBRE_lightmap for all of its instances, which is not used; bake the file again",
+            );
+        }
         notes.add(&name, format!("its {} instances are nodes of their own here", instances.len()));
         write(patch, index, node, mesh, instances);
         expanded = true;
@@ -139,7 +145,7 @@ fn write(patch: &mut Patch, index: usize, node: &Node, mesh: usize, instances: V
     patch.set(&place!["nodes", index, "children"], children.into());
     patch.remove(&place!["nodes", index, "mesh"]);
     let extensions = place!["nodes", index, "extensions"];
-    for name in [EXTENSION, QUADRIC] {
+    for name in [EXTENSION, QUADRIC, LIGHTMAP] {
         patch.remove(&[&extensions[..], &place![name]].concat());
     }
     if patch.get(&extensions).and_then(Value::as_object).is_some_and(Map::is_empty) {
@@ -150,8 +156,9 @@ fn write(patch: &mut Patch, index: usize, node: &Node, mesh: usize, instances: V
 /// Extensions of a node that concern its own mesh rather than its children.
 const FOR_MESHES: [&str; 3] = ["LUMBRE_object", "LUMBRE_shading", QUADRIC];
 
-/// Unlike the others, this extension must not stay at a node that no longer has a mesh.
+/// Unlike the others, these must not stay at a node that no longer has a mesh.
 const QUADRIC: &str = "LUMBRE_quadric";
+const LIGHTMAP: &str = "LUMBRE_lightmap";
 
 fn cloned((name, value): (&String, &Value)) -> (String, Value) {
     (name.clone(), value.clone())

@@ -1,0 +1,46 @@
+//! Direct light at the points that rays hit, where one value for the whole texel would not do: in texels over which
+//! direct light changes much, such as those around a lamp that hangs just below the ceiling. Of such a texel, rays from
+//! the room may reach only the dark part. Direct light elsewhere is read from texels: that is `radiance_cache`.
+
+use glam::{Vec2, Vec3};
+
+use super::incident::Hit;
+use super::radiance_cache::RadianceCache;
+use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::footprint::{FootprintPoint, open_texels, receiver};
+use crate::direct_light::local_light::LocalLight;
+use crate::sampling::Sequence;
+use crate::texel_index::MapTexel;
+
+/// A texel's direct light is steep if that of the texels around it differs by more than this share of the brightest.
+const STEEP: f32 = 0.5;
+/// It matters only if the brightest of them has this many times the light around the texel: the edge of a shadow is
+/// steep too, but rays reach both of its sides.
+const MIN_LIGHT: f64 = 2.0;
+/// Shadow rays to each lamp at a hit.
+const SAMPLES: u32 = 1;
+
+/// Which texels of all maps have steep direct light. `direct` is per texel of all maps, NaN where it is not known.
+pub(crate) fn steep_texels(texels: &CoveredTexels<'_>, direct: &[Vec3], local: &LocalLight) -> Vec<bool> {
+    let mut steep = vec![false; direct.len()];
+    for (covered, texel) in open_texels(&texels.list) {
+        let map = &texels.layout.maps[texel.object as usize];
+        let light = |near: MapTexel| direct[near.place()].element_sum() / 3.0;
+        let around = map.neighbourhood(texel.x, texel.y, 1).map(light).filter(|light| light.is_finite());
+        let (least, most) =
+            around.fold((f32::INFINITY, 0.0f32), |(least, most), light| (least.min(light), most.max(light)));
+        steep[texel.index.place()] =
+            most - least > STEEP * most && f64::from(most) > MIN_LIGHT * local.at(covered.place());
+    }
+    steep
+}
+
+impl RadianceCache<'_> {
+    /// The direct irradiance (mixed lights included) at the point that a ray has hit, W/m², and the rays that it took.
+    pub(crate) fn direct_light_at(&self, hit: &Hit, sequence: Sequence) -> (Vec3, u32) {
+        let point = FootprintPoint { triangle: hit.triangle, at: hit.at, offset: Vec2::ZERO };
+        let receiver = receiver(self.scene, &point);
+        let direct = self.sources.irradiance(sequence, SAMPLES, &|_, _| Some(receiver));
+        (direct.total(), direct.rays)
+    }
+}
