@@ -194,7 +194,7 @@ impl Quality {
             Self::Final => Effort {
                 patches: 8_000,
                 form_factor_rays: 1_500_000,
-                form_factor_rays_per_texel: 0.08,
+                form_factor_rays_per_texel: 0.04,
                 patch_texels: 4.0,
                 direct: [8, 64, 1024],
                 shared: [8, 1024],

@@ -3,9 +3,8 @@
 //! round. As the rays of later rounds read smoothed light, a loss of 0.2 % becomes one of 1 % after a few bounces. The
 //! smoothing itself is in `smooth`.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use super::neighbourhoods::Neighbourhoods;
 use super::replicates::{Estimates, REPLICATES};
 use super::surface::NONE;
 
@@ -17,29 +16,27 @@ struct ChartLight {
 }
 
 /// Multiplies the `smoothed` light of every chart, replicate and channel so that its sum over the chart is that of the
-/// `raw` light. A chart's sum has hardly any noise, so that this adds none.
-pub(crate) fn conserve_light(
-    neighbourhoods: &Neighbourhoods<'_>,
-    raw: &[Estimates],
-    smoothed: &mut [Estimates],
-) {
-    let mut charts = vec![ChartLight::default(); neighbourhoods.chart_count];
-    let chart_of = |texel: usize| match neighbourhoods.charts[texel] {
-        NONE => None,
-        chart => Some(chart as usize),
-    };
-    for (texel, (raw, smoothed)) in raw.iter().zip(&*smoothed).enumerate() {
-        let Some(chart) = chart_of(texel) else { continue };
+/// `raw` light. Smoothing does not cross charts, so that the sum has as much noise as before. `charts` holds the number
+/// of each texel's chart; [`NONE`] for texels that stay as they are.
+pub(crate) fn conserve_light(charts: &[u32], raw: &[Estimates], smoothed: &mut [Estimates]) {
+    let mut sums: Vec<ChartLight> = Vec::new();
+    for (&chart, (raw, smoothed)) in charts.iter().zip(raw.iter().zip(&*smoothed)) {
+        if chart == NONE {
+            continue;
+        }
+        let chart = chart as usize;
+        if chart >= sums.len() {
+            sums.resize(chart + 1, ChartLight::default());
+        }
         for replicate in 0..REPLICATES {
-            charts[chart].raw[replicate] += raw[replicate].as_dvec3();
-            charts[chart].smoothed[replicate] += smoothed[replicate].as_dvec3();
+            sums[chart].raw[replicate] += raw[replicate].as_dvec3();
+            sums[chart].smoothed[replicate] += smoothed[replicate].as_dvec3();
         }
     }
-    let factors: Vec<Estimates> = charts.iter().map(ChartLight::factors).collect();
-    for (texel, smoothed) in smoothed.iter_mut().enumerate() {
-        let Some(chart) = chart_of(texel) else { continue };
-        for (light, factor) in smoothed.iter_mut().zip(factors[chart]) {
-            *light *= factor;
+    let factors: Vec<Estimates> = sums.iter().map(ChartLight::factors).collect();
+    for (&chart, smoothed) in charts.iter().zip(smoothed) {
+        if chart != NONE {
+            smoothed.iter_mut().zip(factors[chart as usize]).for_each(|(light, factor)| *light *= factor);
         }
     }
 }
@@ -50,7 +47,7 @@ impl ChartLight {
         std::array::from_fn(|replicate| {
             let ratio = (self.raw[replicate] / self.smoothed[replicate]).as_vec3();
             let is_known = ratio.is_finite_mask();
-            glam::Vec3::select(is_known, ratio, glam::Vec3::ONE)
+            Vec3::select(is_known, ratio, Vec3::ONE)
         })
     }
 }
@@ -58,7 +55,33 @@ impl ChartLight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
+
+    #[test]
+    fn every_chart_keeps_its_light() {
+        let light = |red: f32| -> Estimates {
+            std::array::from_fn(|replicate| Vec3::new(red + replicate as f32, 0.0, 2.0))
+        };
+        let charts = [1, 0, 1, NONE, 0];
+        let raw = [4.0, 1.0, 6.0, 5.0, 3.0].map(light);
+        let mut smoothed = [4.5, 2.5, 4.5, 7.0, 2.5].map(light);
+        let before = smoothed;
+        conserve_light(&charts, &raw, &mut smoothed);
+        for replicate in 0..REPLICATES {
+            let sum = |of: &[Estimates], chart: u32| -> Vec3 {
+                of.iter().zip(charts).filter(|(_, of)| *of == chart).map(|(light, _)| light[replicate]).sum()
+            };
+            for chart in [0, 1] {
+                let (kept, expected) = (sum(&smoothed, chart), sum(&raw, chart));
+                assert!((kept - expected).abs().max_element() < 1e-5, "{chart}: {kept} {expected}");
+                assert_ne!(sum(&before, chart), expected, "smoothing had changed it");
+            }
+            assert_eq!(
+                smoothed[0][replicate], smoothed[2][replicate],
+                "one factor for all texels of a chart"
+            );
+        }
+        assert_eq!(smoothed[3], before[3]);
+    }
 
     #[test]
     fn a_chart_without_light_stays_as_it_is() {

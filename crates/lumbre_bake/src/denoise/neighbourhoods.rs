@@ -19,8 +19,7 @@ pub(crate) struct Neighbourhoods<'a> {
     covered: Vec<u32>,
     grid: TexelRows,
     /// For each covered texel, the number of its chart within its group; [`NONE`] for hidden ones.
-    pub charts: Vec<u32>,
-    pub chart_count: usize,
+    pub texel_charts: Vec<u32>,
     /// The first row of each map in the grid.
     first_rows: Vec<usize>,
     /// The first texel of each row, as an index into all maps.
@@ -41,7 +40,7 @@ impl<'a> Neighbourhoods<'a> {
         let mut numbers: HashMap<(u32, [u32; 3], u32), u32> = HashMap::new();
         let mut covered = vec![NONE; layout.texels];
         let mut texel_surfaces = vec![NONE; layout.texels];
-        let mut chart_numbers: HashMap<(u32, u32), u32> = HashMap::new();
+        let (mut chart_numbers, mut surface_charts) = (HashMap::new(), Vec::new());
         let mut texel_charts = vec![NONE; texels.len()];
         for (index, texel) in open_texels(texels) {
             let (chart, normal) =
@@ -49,11 +48,12 @@ impl<'a> Neighbourhoods<'a> {
             let group = groups.get(index.place()).copied().unwrap_or(0);
             let key = (chart, normal.to_array().map(f32::to_bits), group);
             let surface = *numbers.entry(key).or_insert_with(|| {
+                let next_chart = chart_numbers.len() as u32;
+                surface_charts.push(*chart_numbers.entry((chart, group)).or_insert(next_chart));
                 surfaces.push(Surface { chart, normal, group });
                 surfaces.len() as u32 - 1
             });
-            let next_chart = chart_numbers.len() as u32;
-            texel_charts[index.place()] = *chart_numbers.entry((chart, group)).or_insert(next_chart);
+            texel_charts[index.place()] = surface_charts[surface as usize];
             covered[texel.index.place()] = index.0;
             texel_surfaces[texel.index.place()] = surface;
         }
@@ -65,8 +65,7 @@ impl<'a> Neighbourhoods<'a> {
             first_rows.push(row_starts.len());
             row_starts.extend((0..map.height as usize).map(|row| map.first + row * map.width as usize));
         }
-        let (charts, chart_count) = (texel_charts, chart_numbers.len());
-        Self { scene, texels, covered, grid, charts, chart_count, first_rows, row_starts }
+        Self { scene, texels, covered, grid, texel_charts, first_rows, row_starts }
     }
 
     /// Length of a texel's side on its surface, canonical units.

@@ -52,7 +52,7 @@ pub(crate) fn smooth(
         if texel.is_hidden() { (*estimates, 0.0) } else { (smoothed, values[BIAS]) }
     });
     let (mut smoothed, biases): (Vec<Estimates>, Vec<f32>) = results.unzip();
-    conserve_light(neighbourhoods, estimates, &mut smoothed);
+    conserve_light(&neighbourhoods.texel_charts, estimates, &mut smoothed);
     (smoothed, biases)
 }
 

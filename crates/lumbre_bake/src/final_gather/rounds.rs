@@ -187,12 +187,12 @@ struct RoundPlan {
 }
 
 impl RoundPlan {
-    /// How many samples of each replicate are to be added to what has been `gathered`.
+    /// How many samples, of all replicates together, are to be added to what has been `gathered`.
     fn samples(&self, gathered: &[GatherSums]) -> f64 {
         let added = |allocation: &SampleAllocation| {
             f64::from(allocation.samples) - f64::from(gathered[allocation.texel.place()].samples)
         };
-        self.wanted.iter().map(added).sum()
+        self.wanted.iter().map(added).sum::<f64>() * REPLICATES as f64
     }
 
     /// Returns true if the round that followed this plan hardly reduced the error: `left` is its reducible error

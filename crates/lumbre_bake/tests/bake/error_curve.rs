@@ -11,6 +11,7 @@ use lumbre_optics::{Light, Material};
 use crate::corner::corner;
 
 fn baked(world: &mut World, error: f64) -> BakeReport {
+    // On smaller maps the patches' bias is stated from a handful of checks, and may grow from one round to the next.
     let options = BakeOptions { density: Density::MapSize(48), error, ..BakeOptions::default() };
     Bake::new(&options).run(world).unwrap()
 }

@@ -119,7 +119,7 @@ fn a_furnace_is_baked_without_error() {
     }
 }
 
-/// Rays that a final bake casts for form factors, whatever the level.
+/// Rays that a final bake casts for the form factors of a level with few texels.
 const FORM_FACTOR_RAYS: f64 = 1.5e6;
 
 /// Two closed rooms apart from each other, each with a lamp; one of them contains a box and the camera.
