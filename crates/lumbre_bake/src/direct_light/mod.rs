@@ -20,7 +20,7 @@ use crate::direct_light::local_light::LocalLight;
 use crate::direct_light::shafts::Shafts;
 use crate::direct_light::shared_light::SharedLight;
 use crate::monitor::BakeMonitor;
-use crate::sample_allocation::allocate;
+use crate::sample_allocation::{SampleAllocation, allocate};
 use crate::sampling::{Sequence, Stream};
 use crate::scene::LightmapLayout;
 use crate::sources::direct::{Direct, VisibilitySummary};
@@ -65,18 +65,28 @@ pub(crate) fn direct_light(
 ) -> Result<DirectLight, BakeError> {
     let sampler = SourceSampler::new(sources, texels, known, options, monitor)?;
     let mut direct = sampler.first_pass(monitor)?;
-    let shared = sampler.shared_light(monitor)?;
+    let mut shared = sampler.shared_light(monitor)?;
     let so_far = shared.as_ref().map(|shared| shared.with(&direct));
     monitor.pass(PASS_OF_LOCAL_LIGHT);
     let local = LocalLight::new(sources, texels, so_far.as_ref().unwrap_or(&direct), monitor)?;
-    let goals = ErrorGoals::new(sources, texels, options, shared.is_some());
-    let doubtful = sampler.resample_doubtful(&mut direct, monitor)?;
-    sampler.refine(&doubtful, &mut direct, &local, goals.individual, monitor)?;
+    let mut doubtful = sampler.doubtful_texels(&direct);
+    for (step, error) in error_goals(options).into_iter().enumerate() {
+        if step > 0 && monitor.clock().is_past(LAST_STEP_BEGIN) {
+            break;
+        }
+        let options = BakeOptions { error, ..*options };
+        let goals = ErrorGoals::new(sources, texels, &options, shared.is_some());
+        sampler.resample(&mut doubtful, &mut direct, options.effort().direct, monitor)?;
+        sampler.refine(&mut doubtful, &mut direct, &local, (options.effort().direct, goals.individual), monitor)?;
+        if let Some(shared) = &mut shared {
+            let left = sum(&relative_variances(&direct, &local));
+            let goal = |share: f64| goals.of_shared(share, left);
+            let share = |samples: f64| goals.share_for(samples);
+            shared.refine(&local, (share(0.0), &share), &goal, monitor)?;
+        }
+    }
     if let Some(shared) = shared {
-        let left = sum(&relative_variances(&direct, &local));
-        let goal = |share: f64| goals.of_shared(share, left);
-        let share = |samples: f64| goals.share_for(samples);
-        shared.finish(&mut direct, &local, (share(0.0), &share), &goal, monitor)?;
+        shared.add_to(&mut direct);
     }
     let rays = sampler.unknown().map(|texel| u64::from(direct[texel.place()].rays));
     report.rays += rays.sum::<u64>();
@@ -174,55 +184,98 @@ impl<'a> SourceSampler<'a> {
         Ok(Some(shared))
     }
 
-    /// Samples texels in or near penumbras with many samples, as far as there is time; returns those texels.
-    fn resample_doubtful(
+    /// The texels in or near penumbras, as far as the first pass has found them.
+    fn doubtful_texels(&self, direct: &[Direct]) -> DoubtfulTexels {
+        let mut texels = doubtful_texels(self.texels.layout, &self.texels.list, direct);
+        texels.retain(|&texel| self.is_wanted(texel) && direct[texel.place()].sampled);
+        let [few, ..] = self.options.effort().direct;
+        DoubtfulTexels { texels, samples: vec![few; self.texels.list.len()] }
+    }
+
+    /// Takes `many` samples of each doubtful texel that has had fewer, as far as there is time.
+    fn resample(
         &self,
+        doubtful: &mut DoubtfulTexels,
         direct: &mut [Direct],
+        [_, many, _]: [u32; 3],
         monitor: &mut BakeMonitor<'_>,
-    ) -> Result<Vec<CoveredTexel>, BakeError> {
-        let [_, many, _] = self.options.effort().direct;
-        let mut doubtful = doubtful_texels(self.texels.layout, &self.texels.list, direct);
-        doubtful.retain(|&texel| self.is_wanted(texel) && direct[texel.place()].sampled);
-        monitor.pass(PASS);
-        let better =
-            in_chunks_until_deadline(doubtful.len(), monitor, |place| self.light(doubtful[place], many))?;
-        replace_first(direct, &doubtful, better);
-        Ok(doubtful)
+    ) -> Result<(), BakeError> {
+        let has_fewer = |texel: &CoveredTexel| doubtful.samples[texel.place()] < many;
+        let texels = doubtful.texels.iter().copied().filter(has_fewer);
+        let wanted: Vec<SampleAllocation> =
+            texels.map(|texel| SampleAllocation { texel, samples: many }).collect();
+        self.sample(&wanted, doubtful, direct, monitor)?;
+        Ok(())
     }
 
     /// Takes more samples of doubtful texels, mostly at the edges of shadows, until the sum of squared errors is down
     /// to `goal`, no texel can have more, or the time is up.
     fn refine(
         &self,
-        doubtful: &[CoveredTexel],
+        doubtful: &mut DoubtfulTexels,
         direct: &mut [Direct],
         local: &LocalLight,
-        goal: f64,
+        ([_, _, most], goal): ([u32; 3], f64),
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
-        let [_, many, most] = self.options.effort().direct;
-        let mut samples = vec![many; self.texels.list.len()];
         loop {
             let variances = relative_variances(direct, local);
             if sum(&variances) <= goal {
                 return Ok(());
             }
-            let allocated = allocate(doubtful.iter().copied(), &variances, &samples, most, ORDER, goal);
-            monitor.pass(PASS);
-            let better = in_chunks_until_deadline(allocated.len(), monitor, |index| {
-                self.light(allocated[index].texel, allocated[index].samples)
-            })?;
-            if better.is_empty() {
+            let texels = doubtful.texels.iter().copied();
+            let allocated = allocate(texels, &variances, &doubtful.samples, most, ORDER, goal);
+            if self.sample(&allocated, doubtful, direct, monitor)? == 0 {
                 return Ok(());
             }
-            for allocation in &allocated {
-                samples[allocation.texel.place()] = allocation.samples;
-            }
-            let texels: Vec<CoveredTexel> = allocated.iter().map(|allocation| allocation.texel).collect();
-            replace_first(direct, &texels, better);
         }
     }
+
+    /// Samples the texels of a list anew, as far as there is time; returns for how many of them there was. Their rays
+    /// add up.
+    fn sample(
+        &self,
+        wanted: &[SampleAllocation],
+        doubtful: &mut DoubtfulTexels,
+        direct: &mut [Direct],
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<usize, BakeError> {
+        monitor.pass(PASS);
+        let lights = in_chunks_until_deadline(wanted.len(), monitor, |index| {
+            self.light(wanted[index].texel, wanted[index].samples)
+        })?;
+        for (SampleAllocation { texel, samples }, &light) in wanted.iter().zip(&lights) {
+            let rays = direct[texel.place()].rays + light.rays;
+            direct[texel.place()] = Direct { rays, ..light };
+            doubtful.samples[texel.place()] = *samples;
+        }
+        Ok(lights.len())
+    }
 }
+
+/// The texels that may need more samples than the first pass takes.
+struct DoubtfulTexels {
+    texels: Vec<CoveredTexel>,
+    /// Samples that have been taken, for every covered texel.
+    samples: Vec<u32>,
+}
+
+/// The errors to aim at, one after the other. With a time limit they begin with a coarse one and go down by halves to
+/// the requested one: whenever the time is up, all texels are about equally good.
+fn error_goals(options: &BakeOptions) -> Vec<f64> {
+    let mut goals = vec![options.error];
+    while options.time.is_some() && goals[goals.len() - 1] < COARSEST_GOAL {
+        goals.push(2.0 * goals[goals.len() - 1]);
+    }
+    goals.reverse();
+    goals
+}
+
+/// Under a time limit the first error to aim at is at least this one.
+const COARSEST_GOAL: f64 = 0.08;
+/// The share of the stage's time after which no finer error is aimed at: each half takes more time than all before, and
+/// the final gather makes better use of it.
+const LAST_STEP_BEGIN: f64 = 0.6;
 
 /// The light of a texel from a previous bake.
 fn known_light(known: &[Option<Direct>], texel: CoveredTexel) -> Option<Direct> {
@@ -310,14 +363,6 @@ fn relative_variances(direct: &[Direct], local: &LocalLight) -> Vec<f32> {
 
 fn sum(numbers: &[f32]) -> f64 {
     numbers.iter().map(|&number| f64::from(number)).sum()
-}
-
-/// Replaces the light of the first texels of a list, for which there was time; their rays add up.
-fn replace_first(direct: &mut [Direct], texels: &[CoveredTexel], better: Vec<Direct>) {
-    for (texel, better) in texels.iter().zip(better) {
-        let light = &mut direct[texel.place()];
-        *light = Direct { rays: light.rays + better.rays, ..better };
-    }
 }
 
 /// Texels that have, within [`REACH`], a texel (perhaps themselves) that saw a source partly, or one that saw other

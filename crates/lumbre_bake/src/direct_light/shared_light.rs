@@ -21,6 +21,7 @@ use crate::sampling::{Stream, hash};
 use crate::sources::direct::Direct;
 use crate::sources::light_cut::SharedSources;
 use crate::sources::light_sources::Sources;
+use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions};
 
@@ -102,6 +103,16 @@ pub(crate) struct SharedLight<'a> {
     most: u32,
     /// Per covered texel.
     sums: Vec<SampleSums>,
+    /// What `sums` give.
+    smoothed: SmoothedLight,
+}
+
+/// Light whose noise has been smoothed over neighbours, and its errors.
+#[derive(Default)]
+struct SmoothedLight {
+    /// Per covered texel.
+    estimates: Vec<Estimates>,
+    variances: SquaredErrors,
 }
 
 impl<'a> SharedLight<'a> {
@@ -119,8 +130,9 @@ impl<'a> SharedLight<'a> {
     ) -> Result<Self, BakeError> {
         let texels = neighbourhoods.texels;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
+        let (sums, smoothed) = (Vec::new(), SmoothedLight::default());
         let mut light =
-            Self { sources, texels, cuts, neighbourhoods, options, first, most, sums: Vec::new() };
+            Self { sources, texels, cuts, neighbourhoods, options, first, most, sums, smoothed };
         // A complete map comes first, whatever time it takes; if time is limited, with a single sample.
         let begun = monitor.seconds();
         let few = if options.time.is_some() { 1 } else { first };
@@ -142,6 +154,7 @@ impl<'a> SharedLight<'a> {
             })?;
             light.sums.splice(..more.len(), more);
         }
+        light.smoothed = light.smooth(monitor)?;
         Ok(light)
     }
 
@@ -170,34 +183,37 @@ impl<'a> SharedLight<'a> {
         direct.par_iter().zip(&self.sums).map(total).collect()
     }
 
-    /// Takes more rounds, and adds their light to `direct`. `goal` maps a share of the requested squared error to the
-    /// sum over all texels of squared errors, relative to local light, that may then be left. `share` maps the samples
-    /// per texel that the `least` share is expected to need to the share that is aimed at.
+    /// Smooths the samples, and estimates the errors of the result.
+    fn smooth(&self, monitor: &mut BakeMonitor<'_>) -> Result<SmoothedLight, BakeError> {
+        let raw: Vec<Estimates> = self.sums.par_iter().map(SampleSums::estimates).collect();
+        let (estimates, bias) = monitor.run_interruptible(1.0, || match self.options.denoise {
+            true => {
+                let inverse_distances: Vec<f32> =
+                    self.sums.par_iter().map(SampleSums::inverse_distance).collect();
+                smooth(&self.neighbourhoods, &raw, &inverse_distances)
+            }
+            false => (raw, vec![0.0; self.sums.len()]),
+        })?;
+        let spread = monitor.run_interruptible(1.0, || spread(&self.neighbourhoods, &estimates))?;
+        Ok(SmoothedLight { variances: spread.with(&bias), estimates })
+    }
+
+    /// Takes more rounds. `goal` maps a share of the requested squared error to the sum over all texels of squared
+    /// errors, relative to local light, that may then be left. `share` maps the samples per texel that the `least`
+    /// share is expected to need to the share that is aimed at.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
-    pub fn finish(
-        mut self,
-        direct: &mut [Direct],
+    pub fn refine(
+        &mut self,
         local: &LocalLight,
         (least, share): (f64, &impl Fn(f64) -> f64),
         goal: &impl Fn(f64) -> f64,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
         let (mut before, mut chosen_share) = (f64::INFINITY, None);
-        let (estimates, variances) = loop {
-            let raw: Vec<Estimates> = self.sums.par_iter().map(SampleSums::estimates).collect();
-            let (estimates, bias) = monitor.run_interruptible(1.0, || match self.options.denoise {
-                true => {
-                    let inverse_distances: Vec<f32> =
-                        self.sums.par_iter().map(SampleSums::inverse_distance).collect();
-                    smooth(&self.neighbourhoods, &raw, &inverse_distances)
-                }
-                false => (raw, vec![0.0; self.sums.len()]),
-            })?;
-            let spread = monitor.run_interruptible(1.0, || spread(&self.neighbourhoods, &estimates))?;
-            let variances = spread.with(&bias);
-            let relative = local.relative_errors(&variances);
+        loop {
+            let relative = local.relative_errors(&self.smoothed.variances);
             let is_sampled = |texel: &CoveredTexel| self.sums[texel.place()].samples > 0;
             let sampled = CoveredTexel::all(self.texels.len()).filter(is_sampled);
             let summed =
@@ -212,16 +228,8 @@ impl<'a> SharedLight<'a> {
             // Samples are allocated by the cautious errors, but the goal is for the expected ones: scale it.
             let caution = summed(&relative.cautious) / left;
             let allocate = |goal: f64| -> Vec<SampleAllocation> {
-                let sampled = sampled.clone();
-                allocate_within(
-                    budget,
-                    sampled,
-                    &relative.cautious,
-                    &samples,
-                    self.most,
-                    ORDER,
-                    caution * goal,
-                )
+                let (sampled, errors) = (sampled.clone(), &relative.cautious);
+                allocate_within(budget, sampled, errors, &samples, self.most, ORDER, caution * goal)
             };
             // Before a round can reach the least share, a few uncertain texels dominate and the samples of the others
             // cannot be foreseen.
@@ -234,7 +242,7 @@ impl<'a> SharedLight<'a> {
             }
             let goal = goal(chosen_share.unwrap_or(least));
             if left <= goal * ENOUGH || is_stalled || monitor.clock().is_over() {
-                break (estimates, variances);
+                return Ok(());
             }
             before = left;
             let allocated = allocate(goal.max(left / MAX_REDUCTION));
@@ -246,12 +254,18 @@ impl<'a> SharedLight<'a> {
                 sums
             })?;
             if more.is_empty() {
-                break (estimates, variances);
+                return Ok(());
             }
             for (allocation, sums) in allocated.iter().zip(more) {
                 self.sums[allocation.texel.place()] = sums;
             }
-        };
+            self.smoothed = self.smooth(monitor)?;
+        }
+    }
+
+    /// Adds the smoothed light to that of the individually sampled sources.
+    pub fn add_to(self, direct: &mut [Direct]) {
+        let SmoothedLight { estimates, variances } = self.smoothed;
         for (place, (direct, sums)) in direct.iter_mut().zip(&self.sums).enumerate() {
             if sums.samples > 0 {
                 let (estimates, variance) = (&estimates[place], variances.cautious[place]);
@@ -263,6 +277,5 @@ impl<'a> SharedLight<'a> {
                 direct.sampled = true;
             }
         }
-        Ok(())
     }
 }

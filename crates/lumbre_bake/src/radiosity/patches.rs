@@ -4,14 +4,16 @@
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{DMat2, DVec2, Vec3};
+use lumbre_scene::Image;
 use rayon::prelude::*;
 
 use super::bsp::{BspTrees, Corners, CutCell};
 use super::patch_index::PatchIndex;
 use crate::scene::mean_of_points::mean_of_points;
+use crate::scene::mip_level::MipLevel;
 use crate::visibility::contacts::{PlaneFrame, contacts};
 
 use crate::scene::material::Side;
@@ -78,9 +80,12 @@ pub(crate) struct Patches {
     pub warnings: Vec<String>,
 }
 
-/// Most points along a patch's edge at which textures are averaged. Up to that there is one per texel, so that bilinear
-/// filtering misses none.
-const MAX_TEXTURE_POINTS: u32 = 64;
+/// Most points along a patch's edge at which one texture is averaged. If it has more texels there, a mip level of it is
+/// read, so that no texel is missed.
+const MAX_LEVEL_POINTS: f32 = 32.0;
+/// The same where two textures vary together, so that the mean of their product is not the product of their means: up
+/// to that there is one point per texel, so that bilinear filtering misses none.
+const MAX_POINTS: u32 = 64;
 
 impl Patches {
     /// The mean of all patches, weighted by area, of the channels' mean; at most 0.999.
@@ -206,19 +211,23 @@ impl Patches {
 
     /// Finds what each patch reflects, and warns of textures that are too fine for the patches.
     fn find_reflectances(&mut self, scene: &BakeScene) {
-        let of_patch = |patch: &Patch| {
-            if scene.stop.is_cancelled() {
-                return (Vec3::ZERO, 0.0);
-            }
-            let corners = CORNERS.map(|at| self.point(patch, at));
-            reflectance_and_texels(scene, patch.triangle as usize, patch.side, &corners)
-        };
-        let results: Vec<(Vec3, f32)> = self.list.par_iter().map(of_patch).collect();
+        let mut results = vec![(Vec3::ZERO, 0.0); self.list.len()];
+        for (image_level, patches) in self.by_mip_level(scene) {
+            let level = image_level.map(|(image, level)| MipLevel::new(image, level, &scene.stop));
+            let of_patch = |&patch: &PatchIndex| {
+                if scene.stop.is_cancelled() {
+                    return (Vec3::ZERO, 0.0);
+                }
+                self.reflectance_and_texels(scene, patch, level.as_ref())
+            };
+            let found: Vec<(Vec3, f32)> = patches.par_iter().map(of_patch).collect();
+            patches.iter().zip(found).for_each(|(patch, found)| results[patch.place()] = found);
+        }
         // Per object with a patch that shows more texels than there are points, the most texels along a patch's edge.
         let mut most_texels: BTreeMap<u32, f32> = BTreeMap::new();
         for (patch, (reflectance, texels)) in self.list.iter_mut().zip(results) {
             patch.reflectance = reflectance;
-            if texels > MAX_TEXTURE_POINTS as f32 {
+            if texels > MAX_POINTS as f32 {
                 let most = most_texels.entry(scene.triangles[patch.triangle as usize].object).or_default();
                 *most = most.max(texels);
             }
@@ -233,10 +242,62 @@ impl Patches {
         self.warnings.extend(most_texels.into_iter().map(|(object, most)| {
             format!(
                 "{}: a patch of it shows up to {most:.0} texels of its textures along an edge; what bounces off it is the mean of \
-                 {MAX_TEXTURE_POINTS} points along there, which may miss what is smaller",
+                 {MAX_POINTS} points along there, which may miss what is smaller",
                 scene.names[object as usize]
             )
         }));
+    }
+
+    /// The patches, grouped by the image and its mip level that their reflectance is read from; `None` for those that
+    /// read all texels, or no texture.
+    fn by_mip_level<'a>(&self, scene: &'a BakeScene) -> Vec<(Option<(&'a Image, u32)>, Vec<PatchIndex>)> {
+        let level = |patch: &Patch| {
+            let surface = &scene.surfaces[scene.triangles[patch.triangle as usize].surface as usize];
+            let texture = surface.only_reflectance_texture()?;
+            let vertices = scene.triangles[patch.triangle as usize].vertices;
+            let texels = surface.reflectance_texels(vertices, CORNERS.map(|at| self.point(patch, at)));
+            let level = (texels / MAX_LEVEL_POINTS).log2().ceil() as u32;
+            (level > 0).then_some((&*texture.image, level))
+        };
+        // Grouped by the image's address, but in the order of the list, so that nothing depends on addresses.
+        let mut groups: Vec<(Option<(&Image, u32)>, Vec<PatchIndex>)> = Vec::new();
+        let mut group_of = HashMap::new();
+        for (place, patch) in self.list.iter().enumerate() {
+            let level = level(patch);
+            let key = level.map(|(image, level)| (std::ptr::from_ref(image), level));
+            let group = *group_of.entry(key).or_insert(groups.len());
+            if group == groups.len() {
+                groups.push((level, Vec::new()));
+            }
+            groups[group].1.push(PatchIndex::new(place));
+        }
+        groups
+    }
+
+    /// The mean reflectance of a patch, and the number of texels along its longest edge that points may have missed: 0
+    /// if it is read from a mip level.
+    fn reflectance_and_texels(
+        &self,
+        scene: &BakeScene,
+        patch: PatchIndex,
+        level: Option<&MipLevel>,
+    ) -> (Vec3, f32) {
+        let patch = &self.list[patch.place()];
+        let triangle = &scene.triangles[patch.triangle as usize];
+        let surface = &scene.surfaces[triangle.surface as usize];
+        let weights = |at: (f32, f32)| {
+            let (u, v) = self.point(patch, at);
+            [1.0 - u - v, u, v]
+        };
+        let texels = surface.reflectance_texels(triangle.vertices, CORNERS.map(|at| self.point(patch, at)));
+        if let Some(level) = level {
+            let points = (texels * (-(level.level as f32)).exp2()).ceil() as u32;
+            let read = |at| surface.mean_reflectance(patch.side, triangle.vertices, weights(at), level);
+            return (mean_of_points(points, read), 0.0);
+        }
+        let points = if surface.varies() { (texels.ceil() as u32).clamp(2, MAX_POINTS) } else { 1 };
+        let read = |at| surface.reflectance(patch.side, triangle.vertices, weights(at));
+        (mean_of_points(points, read), texels)
     }
 
     /// The patch at a point of a triangle's side, given by barycentric weights; `None` where no light is received.
@@ -422,19 +483,6 @@ fn area_share(corners: &Corners) -> f32 {
 /// The point of a triangle with the given corners at barycentric weights (u, v).
 fn point_between([a, b, c]: &Corners, u: f32, v: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
-}
-
-/// The mean reflectance of a part of a triangle, and the number of texels along its longest edge.
-fn reflectance_and_texels(scene: &BakeScene, index: usize, side: Side, corners: &Corners) -> (Vec3, f32) {
-    let triangle = &scene.triangles[index];
-    let surface = &scene.surfaces[triangle.surface as usize];
-    let texels = surface.reflectance_texels(triangle.vertices, *corners);
-    let points = if surface.varies() { (texels.ceil() as u32).clamp(2, MAX_TEXTURE_POINTS) } else { 1 };
-    let mean = mean_of_points(points, |(u, v)| {
-        let (u, v) = point_between(corners, u, v);
-        surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
-    });
-    (mean, texels)
 }
 
 /// The number of the cell at a point. Row `a` holds 2(n - a) - 1 cells, so the rows before it hold a(2n - a).
