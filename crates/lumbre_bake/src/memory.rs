@@ -10,6 +10,7 @@ use crate::denoise::replicates::Estimates;
 use crate::denoise::texel_rows::BESIDE_A_ROW;
 use crate::error::mebibytes;
 use crate::final_gather::gather_sums::GatherSums;
+use crate::final_gather::texel_radiance::TexelRadiance;
 use crate::radiosity::exchange::Resolution;
 use crate::radiosity::patches::{Patch, Patches};
 use crate::rebake::TexelSamples;
@@ -37,9 +38,8 @@ const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
 
 /// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later:
 /// estimates with their bias, the numbers of the weighted fit, guides with the noise, products, and nearness. Besides,
-/// its place among the covered texels and its surface, and for rays that hit it, its reflectance, whether its direct
-/// light is steep, and the light of the previous round with its error.
-const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + 4 * (3 + 3 + 1 + 2) + 1;
+/// its place among the covered texels and its surface, and what rays that hit it read.
+const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + size_of::<TexelRadiance>() as u64;
 
 /// Per texel of a map, for separate maps of direct and bounced light: both as computed, as filled, and as divided.
 const SEPARATE_LIGHT_BYTES: u64 = 6 * 12;

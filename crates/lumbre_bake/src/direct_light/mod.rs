@@ -77,7 +77,13 @@ pub(crate) fn direct_light(
         let options = BakeOptions { error, ..*options };
         let goals = ErrorGoals::new(sources, texels, &options, shared.is_some());
         sampler.resample(&mut doubtful, &mut direct, options.effort().direct, monitor)?;
-        sampler.refine(&mut doubtful, &mut direct, &local, (options.effort().direct, goals.individual), monitor)?;
+        sampler.refine(
+            &mut doubtful,
+            &mut direct,
+            &local,
+            (options.effort().direct, goals.individual),
+            monitor,
+        )?;
         if let Some(shared) = &mut shared {
             let left = sum(&relative_variances(&direct, &local));
             let goal = |share: f64| goals.of_shared(share, left);

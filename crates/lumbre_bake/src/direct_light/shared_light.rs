@@ -131,8 +131,7 @@ impl<'a> SharedLight<'a> {
         let texels = neighbourhoods.texels;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
         let (sums, smoothed) = (Vec::new(), SmoothedLight::default());
-        let mut light =
-            Self { sources, texels, cuts, neighbourhoods, options, first, most, sums, smoothed };
+        let mut light = Self { sources, texels, cuts, neighbourhoods, options, first, most, sums, smoothed };
         // A complete map comes first, whatever time it takes; if time is limited, with a single sample.
         let begun = monitor.seconds();
         let few = if options.time.is_some() { 1 } else { first };

@@ -117,11 +117,8 @@ pub(crate) struct SamplePath {
     guided_share: Option<f32>,
     /// Part of the guide's row that is searched next.
     row_part: RowPart,
-    /// The texel that was hit, its direct light and its mean reflectance; both NaN where it has none.
+    /// The texel that was hit.
     texel: MapTexel,
-    direct: Vec3,
-    reflectance: Vec3,
-    is_steep: bool,
 }
 
 impl SamplePath {
@@ -131,9 +128,6 @@ impl SamplePath {
         guided_share: None,
         row_part: RowPart::NONE,
         texel: MapTexel::NONE,
-        direct: Vec3::ZERO,
-        reflectance: Vec3::ZERO,
-        is_steep: false,
     };
 }
 
@@ -195,26 +189,23 @@ impl RadianceCache<'_> {
             }
             path.texel = self.texel_at(hit.triangle, hit.side, hit.at);
         }
-        for path in paths.iter_mut() {
-            path.direct = self.direct.get(path.texel.place()).copied().unwrap_or(Vec3::NAN);
-            path.reflectance = self.reflectance.get(path.texel.place()).copied().unwrap_or(Vec3::NAN);
-            path.is_steep = self.steep.get(path.texel.place()).copied().unwrap_or(false);
+        for (path, result) in paths.iter().zip(results.iter_mut()) {
+            let Some(hit) = &mut result.hit else { continue };
+            let texel = self.texels.at(path.texel);
+            (hit.direct, hit.is_steep, hit.reflectance) = (texel.direct, texel.is_steep, texel.reflectance);
+            if let Some(light) = texel.indirect() {
+                (hit.indirect, hit.error) = (light.irradiance, light.patch_error);
+                hit.variance = Some(light.variance);
+            }
         }
         for ((path, request), result) in paths.iter_mut().zip(requests).zip(results.iter_mut()) {
             let Some(hit) = &mut result.hit else { continue };
-            hit.reflectance = match path.reflectance.x.is_nan() {
-                true => self.reflectance_at(hit.triangle, hit.side, hit.at),
-                false => path.reflectance,
-            };
-            match self.gathered.at(path.texel) {
-                Some(texel) => {
-                    (hit.indirect, hit.error) = (texel.irradiance, texel.patch_error);
-                    hit.variance = Some(texel.variance);
-                }
-                None => {
-                    hit.indirect = self.patch_indirect[hit.patch.place()];
-                    hit.error = self.patch_error[hit.patch.place()];
-                }
+            if hit.reflectance.x.is_nan() {
+                hit.reflectance = self.reflectance_at(hit.triangle, hit.side, hit.at);
+            }
+            if hit.variance.is_none() {
+                hit.indirect = self.patch_indirect[hit.patch.place()];
+                hit.error = self.patch_error[hit.patch.place()];
             }
             if let (SampleTarget::Direction(_), Some(region), Some(_)) =
                 (&path.target, request.region, path.guided_share)
@@ -224,9 +215,9 @@ impl RadianceCache<'_> {
         }
         for ((path, request), result) in paths.iter().zip(requests).zip(results) {
             let Some(hit) = &mut result.hit else { continue };
-            hit.is_steep = path.is_steep;
-            hit.direct =
-                if path.direct.x.is_nan() { self.patch_direct[hit.patch.place()] } else { path.direct };
+            if hit.direct.x.is_nan() {
+                hit.direct = self.patch_direct[hit.patch.place()];
+            }
             if let Some(share) = path.guided_share {
                 match self.weight(request, path, share, hit) {
                     Some(weight) => result.weight = weight,

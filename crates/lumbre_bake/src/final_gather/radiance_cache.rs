@@ -4,7 +4,7 @@
 use glam::{Vec2, Vec3};
 
 use super::steep_light::steep_texels;
-use super::texel_radiance::{GatheredLight, mean_reflectances};
+use super::texel_radiance::{TexelRadiances, mean_reflectances};
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::denoise::replicates::REPLICATES;
 use crate::direct_light::DirectLight;
@@ -24,11 +24,8 @@ pub(crate) struct RadianceCache<'a> {
     pub sources: &'a Sources<'a>,
     pub layout: &'a LightmapLayout,
     pub patches: &'a Patches,
-    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where a texel shows nothing, and where a
-    /// wall divides it.
-    pub direct: Vec<Vec3>,
-    /// Per texel of all maps, whether direct light changes so much over it that `direct` does not hold for a point.
-    pub steep: Vec<bool>,
+    /// The light and the reflectance of texels.
+    pub texels: TexelRadiances,
     /// Irradiance of a surface under an unoccluded sky, W/m².
     pub sky: Vec3,
     /// Per patch, direct irradiance, for points whose texel has none.
@@ -41,12 +38,8 @@ pub(crate) struct RadianceCache<'a> {
     /// Per patch, the distance below which it is too coarse to be read, canonical units: nearer rays make another
     /// bounce.
     pub min_read_distance: &'a [f32],
-    /// The light by bounces that the rounds so far have found; empty in the first.
-    pub gathered: GatheredLight,
-    /// Radius on a surface within which the errors of `gathered` are correlated, canonical units.
+    /// Radius on a surface within which the errors that rounds leave in texels are correlated, canonical units.
     pub correlation_radius: f32,
-    /// Per texel of all maps, mean reflectance where it varies over the triangle, and NaN elsewhere; or empty.
-    pub reflectance: Vec<Vec3>,
     /// Which regions the light of each region comes from.
     pub guide: &'a SamplingGuide,
     /// Samples of each replicate in the first round.
@@ -81,15 +74,12 @@ impl<'a> RadianceCache<'a> {
             mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list)
         })?;
         Ok(Self {
-            gathered: GatheredLight::default(),
             correlation_radius: CORRELATED_TEXELS * texels.side,
-            reflectance,
+            texels: TexelRadiances::new(&direct_by_place, &steep, &reflectance),
             scene,
             sources,
             layout: texels.layout,
             patches: &exchange.patches,
-            direct: direct_by_place,
-            steep,
             sky: sources.sky,
             patch_direct: &exchange.direct,
             patch_indirect: &exchange.indirect,
@@ -106,11 +96,10 @@ impl RadianceCache<'_> {
     /// patch.
     pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
         let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
-        let texel = self.texel_at(triangle, side, at);
-        let gathered = self.gathered.at(texel).map(|texel| texel.irradiance);
+        let texel = self.texels.at(self.texel_at(triangle, side, at));
+        let gathered = texel.indirect().map(|light| light.irradiance);
         let indirect = gathered.unwrap_or_else(|| self.patch_indirect[patch.place()]);
-        let direct = self.direct_of(texel);
-        let direct = direct.unwrap_or_else(|| self.patch_direct[patch.place()]);
+        let direct = texel.direct().unwrap_or_else(|| self.patch_direct[patch.place()]);
         let irradiance = direct + indirect;
         self.reflectance_at(triangle, side, at) * irradiance
     }
@@ -128,10 +117,5 @@ impl RadianceCache<'_> {
     pub(crate) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> MapTexel {
         let texel = self.layout.texel_at(&self.scene.triangles[triangle as usize], at);
         texel.filter(|_| side == Side::Front).unwrap_or(MapTexel::NONE)
-    }
-
-    /// The direct irradiance of a texel, if one value holds for all of it.
-    pub(crate) fn direct_of(&self, texel: MapTexel) -> Option<Vec3> {
-        self.direct.get(texel.place()).copied().filter(|direct| !direct.x.is_nan())
     }
 }

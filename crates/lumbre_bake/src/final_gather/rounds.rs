@@ -12,7 +12,6 @@ use super::map_error::MapError;
 use super::patch_fallback::from_patches;
 use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
-use super::texel_radiance::GatheredLight;
 use crate::chunks::in_chunks_until_deadline;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::Texel;
@@ -126,8 +125,8 @@ pub(crate) fn gather(
             break result;
         }
         let variances = &result.reducible.expected;
-        cache.gathered = monitor.run_interruptible(1.0, || {
-            GatheredLight::new(list, &gathered, &result.light, variances, &cache.direct)
+        monitor.run_interruptible(1.0, || {
+            cache.texels.set_indirect(list, &gathered, &result.light, variances);
         })?;
         monitor.pass(ROUND_PROGRESS);
         let rest = planner.open.iter().map(|texel| reads.rest_in(&gathered[texel.place()])).sum::<f64>();
@@ -136,8 +135,8 @@ pub(crate) fn gather(
         plan = Some(next);
     };
     let RoundResult { light, variances, .. } = result;
-    cache.gathered = monitor.run_interruptible(1.0, || {
-        GatheredLight::new(list, &gathered, &light, &variances.expected, &cache.direct)
+    monitor.run_interruptible(1.0, || {
+        cache.texels.set_indirect(list, &gathered, &light, &variances.expected);
     })?;
     report.leaked_rays = cache.scene.leaks.count() - leaked_before;
     report.rays += gathered.iter().map(|sums| sums.rays).sum::<u64>();

@@ -10,12 +10,24 @@ use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
 use crate::texel_index::MapTexel;
 
-/// The irradiance by bounces that an earlier round of the gather has found in every texel. It is more accurate than
-/// that of the patches, so rays that read it need no further bounce.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct GatheredLight {
-    /// Per texel of all maps; NaN irradiance where it is not known.
-    texels: Vec<TexelLight>,
+/// What rays read of every texel of all maps.
+#[derive(Clone, Debug)]
+pub(crate) struct TexelRadiances(Vec<TexelRadiance>);
+
+/// What rays read of one texel. It is aligned such that a read from anywhere in memory fetches a single cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(crate) struct TexelRadiance {
+    /// Direct irradiance, W/m² (mixed lights included); NaN where the texel shows nothing, and where a wall divides it.
+    pub direct: Vec3,
+    /// Whether direct light changes so much over the texel that `direct` does not hold for a point.
+    pub is_steep: bool,
+    /// Mean reflectance where it varies over the triangle; NaN elsewhere.
+    pub reflectance: Vec3,
+    /// The light by bounces that an earlier round of the gather has found; its irradiance is NaN where it is not known,
+    /// and before the first round. It is more accurate than that of the patches, so rays that read it need no further
+    /// bounce.
+    indirect: TexelLight,
 }
 
 /// The light by bounces of one texel.
@@ -29,33 +41,62 @@ pub(crate) struct TexelLight {
     pub patch_error: Vec2,
 }
 
-impl GatheredLight {
-    /// `gathered`, `light` and `variances` are per covered texel; `direct`, per texel of all maps, is NaN where one
-    /// value does not hold for the whole texel.
-    pub fn new(
+impl TexelRadiance {
+    /// Of a texel of which nothing is known.
+    pub const UNKNOWN: Self = Self {
+        direct: Vec3::NAN,
+        is_steep: false,
+        reflectance: Vec3::NAN,
+        indirect: TexelLight { irradiance: Vec3::NAN, variance: 0.0, patch_error: Vec2::ZERO },
+    };
+
+    /// The direct irradiance, if one value holds for all of the texel.
+    pub fn direct(&self) -> Option<Vec3> {
+        (!self.direct.x.is_nan()).then_some(self.direct)
+    }
+
+    /// The light by bounces, if it is known.
+    #[inline]
+    pub fn indirect(&self) -> Option<&TexelLight> {
+        (!self.indirect.irradiance.x.is_nan()).then_some(&self.indirect)
+    }
+}
+
+impl TexelRadiances {
+    /// Before the first round of the gather. All lists are per texel of all maps, and NaN where nothing is known;
+    /// `reflectance` may be empty.
+    pub fn new(direct: &[Vec3], steep: &[bool], reflectance: &[Vec3]) -> Self {
+        let texel = |(place, (&direct, &is_steep)): (usize, (&Vec3, &bool))| {
+            let reflectance = reflectance.get(place).copied().unwrap_or(Vec3::NAN);
+            TexelRadiance { direct, is_steep, reflectance, ..TexelRadiance::UNKNOWN }
+        };
+        Self(direct.iter().zip(steep).enumerate().map(texel).collect())
+    }
+
+    /// Sets the light by bounces that a round of the gather has found. All lists are per covered texel.
+    pub fn set_indirect(
+        &mut self,
         texels: &[Texel],
         gathered: &[GatherSums],
         light: &[Vec3],
         variances: &[f32],
-        direct: &[Vec3],
-    ) -> Self {
-        let unknown = TexelLight { irradiance: Vec3::NAN, variance: 0.0, patch_error: Vec2::ZERO };
-        let mut known = vec![unknown; direct.len()];
+    ) {
         for (place, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
             let (irradiance, variance) = (light[place], variances[place]);
             let patch_error = gathered[place].patch_error();
+            let radiance = &mut self.0[texel.index.place()];
             let is_finite = irradiance.is_finite() && variance.is_finite() && patch_error.is_finite();
-            if is_finite && !direct[texel.index.place()].is_nan() {
-                known[texel.index.place()] = TexelLight { irradiance, variance, patch_error };
-            }
+            radiance.indirect = match is_finite && !radiance.direct.x.is_nan() {
+                true => TexelLight { irradiance, variance, patch_error },
+                false => TexelRadiance::UNKNOWN.indirect,
+            };
         }
-        Self { texels: known }
     }
 
-    /// The light of a texel, if it is known.
+    /// What is known of a texel.
     #[inline]
-    pub fn at(&self, texel: MapTexel) -> Option<&TexelLight> {
-        self.texels.get(texel.place()).filter(|texel| !texel.irradiance.x.is_nan())
+    pub fn at(&self, texel: MapTexel) -> &TexelRadiance {
+        self.0.get(texel.place()).unwrap_or(&TexelRadiance::UNKNOWN)
     }
 }
 

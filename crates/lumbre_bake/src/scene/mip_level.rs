@@ -34,7 +34,8 @@ impl MipLevel {
                     return Vec3::ZERO;
                 }
                 let of_row = |&(y, weight): &(usize, f32)| {
-                    let colors = columns.iter().map(|&(x, weight)| weight * texel(image, x, y, true).truncate());
+                    let colors =
+                        columns.iter().map(|&(x, weight)| weight * texel(image, x, y, true).truncate());
                     weight * colors.sum::<Vec3>()
                 };
                 rows.iter().map(of_row).sum()
@@ -72,7 +73,8 @@ mod tests {
     #[test]
     fn a_level_keeps_the_mean_of_the_image() {
         let (width, height) = (5, 3);
-        let rgba: Vec<u8> = (0..width * height).flat_map(|at| [if at % 4 == 0 { 255 } else { 0 }; 4]).collect();
+        let rgba: Vec<u8> =
+            (0..width * height).flat_map(|at| [if at % 4 == 0 { 255 } else { 0 }; 4]).collect();
         let image = Image { name: "dots".into(), width, height, rgba };
         for (level, size) in [(0, (5, 3)), (1, (3, 2)), (2, (2, 1)), (3, (1, 1)), (40, (1, 1))] {
             let level = MipLevel::new(&image, level, &CancelToken::default());
