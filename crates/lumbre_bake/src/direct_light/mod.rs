@@ -387,3 +387,20 @@ fn doubtful_texels(layout: &LightmapLayout, texels: &[Texel], direct: &[Direct])
     };
     CoveredTexel::all(texels.len()).filter(|covered| is_doubtful(&texels[covered.place()])).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn only_a_time_limit_makes_direct_light_go_through_coarser_goals() {
+        let goals = |error: f64, time: Option<u64>| {
+            error_goals(&BakeOptions { error, time: time.map(Duration::from_secs), ..BakeOptions::default() })
+        };
+        assert_eq!(goals(0.01, None), [0.01]);
+        assert_eq!(goals(0.01, Some(60)), [0.08, 0.04, 0.02, 0.01]);
+        assert_eq!(goals(0.5, Some(60)), [0.5], "coarser than any goal");
+    }
+}

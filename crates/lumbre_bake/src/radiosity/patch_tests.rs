@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::Material;
-use lumbre_scene::{Image, MaterialTextures, Sampler, TextureReference};
+use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, Sampler, TextureReference};
 
 use super::form_factor_tests::{scene, square};
 use super::patch_index::PatchIndex;
@@ -109,10 +109,34 @@ fn a_patch_reflects_the_mean_of_its_texels() {
     for side in [9.0, 0.5, 0.1] {
         for is_white in [&spots as &dyn Fn(u32, u32) -> bool, &stripes, &checker] {
             let patches = check(is_white, side);
-            // A whole triangle has 91 texels along its diagonal, more than the most points along an edge.
-            let warnings =
-                patches.warnings.iter().filter(|warning| warning.contains("texels of its textures")).count();
-            assert_eq!(warnings, usize::from(side > 1.0), "{:?}", patches.warnings);
+            assert!(patches.warnings.is_empty(), "{:?}", patches.warnings);
         }
+    }
+}
+
+#[test]
+fn two_textures_that_vary_together_are_averaged_as_their_product() {
+    // Metal exactly where the base colour is white: no point reflects diffusely, though the product of the means is 0.2.
+    let is_white = |x: u32, y: u32| (x / 16 + y / 16).is_multiple_of(2);
+    for side in [9.0, 0.5] {
+        let mut scene = textured(is_white);
+        let textures = scene.surfaces[0].textures.as_mut().expect("a textured surface");
+        let texture = textures.base_color.clone().expect("a base colour");
+        let base_color = Vec3::splat(0.8);
+        textures.metallic_roughness = Some(MetallicRoughnessTexture {
+            texture,
+            base_color,
+            metallic: 1.0,
+            roughness: 1.0,
+            dielectric: Vec3::splat(0.04),
+        });
+        let patches = Patches::new(&scene, side * scene.space.scale as f32);
+        let mean = patches.mean_reflectance();
+        // Where the two meet, bilinear filtering leaves a line of partly metallic texels.
+        assert!(mean < 0.04, "{} patches: {mean}", patches.list.len());
+        // A whole triangle has 91 texels along its diagonal, more than the most points along an edge.
+        let is_too_fine = |warning: &&String| warning.contains("texels of its textures");
+        let warnings = patches.warnings.iter().filter(is_too_fine).count();
+        assert_eq!(warnings, usize::from(side > 1.0), "{:?}", patches.warnings);
     }
 }

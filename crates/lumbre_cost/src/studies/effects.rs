@@ -50,12 +50,12 @@ fn of_its_own(conditions: &Conditions<'_>) -> Result<SceneFile, CostError> {
     if conditions.quick {
         return SceneFile::made(conditions, "hazy-room", room(Air::Hazy));
     }
-    let name = "every-effect";
+    let name = "room-with-all-effects";
     let scene = SceneFile::made(conditions, name, every_effect())?;
     let options =
         BakeOptions { probes: Probes::Always, error: 0.05, ..bake_options(conditions, &scene, TEXELS)? };
     let baked = bake_scene(conditions, &scene, &options, [0.0, 0.05])?;
-    SceneFile::made(conditions, &format!("{name}-baked"), baked.world)
+    SceneFile::made(conditions, &format!("baked-{name}"), baked.world)
 }
 
 fn study() -> Study {

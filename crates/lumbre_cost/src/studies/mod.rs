@@ -62,7 +62,7 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind {
         name: "effects",
         about: "every effect of a scene, switched off in turn",
-        method: 2,
+        method: 3,
         run: effects::run,
     },
     StudyKind { name: "bake", about: "bakes over the requested error", method: 2, run: bake::run },
@@ -75,7 +75,7 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind {
         name: "transport",
         about: "frames compared with all light by path tracing",
-        method: 2,
+        method: 3,
         run: light_transport::run,
     },
     StudyKind {
