@@ -80,11 +80,13 @@ pub(crate) struct Patches {
     pub warnings: Vec<String>,
 }
 
-/// Most points along a patch's edge at which one texture is averaged. If it has more texels there, a mip level of it is
-/// read, so that no texel is missed.
-const MAX_LEVEL_POINTS: f32 = 32.0;
-/// The same where two textures vary together, so that the mean of their product is not the product of their means: up
-/// to that there is one point per texel, so that bilinear filtering misses none.
+/// Most texels of one texture along a patch's edge. If there are more, a mip level of it is read, so that none is missed.
+const MAX_LEVEL_TEXELS: f32 = 16.0;
+/// Points for each texel of such a level, along an edge: with one, a spot of a 256th of the texture counted 22 % too
+/// little.
+const POINTS_PER_LEVEL_TEXEL: f32 = 2.0;
+/// Most points along a patch's edge where two textures vary together, so that the mean of their product is not the
+/// product of their means: up to that there is one point per texel, so that bilinear filtering misses none.
 const MAX_POINTS: u32 = 64;
 
 impl Patches {
@@ -212,8 +214,8 @@ impl Patches {
     /// Finds what each patch reflects, and warns of textures that are too fine for the patches.
     fn find_reflectances(&mut self, scene: &BakeScene) {
         let mut results = vec![(Vec3::ZERO, 0.0); self.list.len()];
-        for (image_level, patches) in self.by_mip_level(scene) {
-            let level = image_level.map(|(image, level)| MipLevel::new(image, level, &scene.stop));
+        for SharedLevel { level, patches } in self.by_mip_level(scene) {
+            let level = level.map(|(image, level)| MipLevel::new(image, level, &scene.stop));
             let of_patch = |&patch: &PatchIndex| {
                 if scene.stop.is_cancelled() {
                     return (Vec3::ZERO, 0.0);
@@ -248,28 +250,27 @@ impl Patches {
         }));
     }
 
-    /// The patches, grouped by the image and its mip level that their reflectance is read from; `None` for those that
-    /// read all texels, or no texture.
-    fn by_mip_level<'a>(&self, scene: &'a BakeScene) -> Vec<(Option<(&'a Image, u32)>, Vec<PatchIndex>)> {
+    /// The patches, grouped by the mip level that their reflectance is read from.
+    fn by_mip_level<'a>(&self, scene: &'a BakeScene) -> Vec<SharedLevel<'a>> {
         let level = |patch: &Patch| {
             let surface = &scene.surfaces[scene.triangles[patch.triangle as usize].surface as usize];
             let texture = surface.only_reflectance_texture()?;
             let vertices = scene.triangles[patch.triangle as usize].vertices;
             let texels = surface.reflectance_texels(vertices, CORNERS.map(|at| self.point(patch, at)));
-            let level = (texels / MAX_LEVEL_POINTS).log2().ceil() as u32;
+            let level = (texels / MAX_LEVEL_TEXELS).log2().ceil() as u32;
             (level > 0).then_some((&*texture.image, level))
         };
         // Grouped by the image's address, but in the order of the list, so that nothing depends on addresses.
-        let mut groups: Vec<(Option<(&Image, u32)>, Vec<PatchIndex>)> = Vec::new();
+        let mut groups: Vec<SharedLevel<'_>> = Vec::new();
         let mut group_of = HashMap::new();
         for (place, patch) in self.list.iter().enumerate() {
             let level = level(patch);
             let key = level.map(|(image, level)| (std::ptr::from_ref(image), level));
             let group = *group_of.entry(key).or_insert(groups.len());
             if group == groups.len() {
-                groups.push((level, Vec::new()));
+                groups.push(SharedLevel { level, patches: Vec::new() });
             }
-            groups[group].1.push(PatchIndex::new(place));
+            groups[group].patches.push(PatchIndex::new(place));
         }
         groups
     }
@@ -291,7 +292,8 @@ impl Patches {
         };
         let texels = surface.reflectance_texels(triangle.vertices, CORNERS.map(|at| self.point(patch, at)));
         if let Some(level) = level {
-            let points = (texels * (-(level.level as f32)).exp2()).ceil() as u32;
+            let texels = texels * (-(level.level as f32)).exp2();
+            let points = (POINTS_PER_LEVEL_TEXEL * texels).ceil() as u32;
             let read = |at| surface.mean_reflectance(patch.side, triangle.vertices, weights(at), level);
             return (mean_of_points(points, read), 0.0);
         }
@@ -361,6 +363,13 @@ impl Patches {
 
 /// A patch is too coarse within this many times the length of its side.
 const NEAR_SIDES: f32 = 2.0;
+
+/// Patches whose reflectance is read from the same mip level.
+struct SharedLevel<'a> {
+    /// The image and its level; `None` for patches that read all texels, or no texture.
+    level: Option<(&'a Image, u32)>,
+    patches: Vec<PatchIndex>,
+}
 
 /// The cells of a triangle, and how contact lines cut some of them.
 struct TriangleCells {
