@@ -26,6 +26,9 @@ pub struct Progress {
 /// Receives the progress and answers whether the bake should continue.
 pub(crate) type Callback<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + 'a;
 
+/// Where a pass ends at most, as a fraction of its stage: other passes may follow.
+const MAX_PASS_END: f32 = 0.999;
+
 /// Interval between calls of the progress callback during long work.
 const CALLBACK_INTERVAL: Duration = Duration::from_millis(50);
 
@@ -189,6 +192,12 @@ impl<'a> BakeMonitor<'a> {
         self.clock.seconds()
     }
 
+    /// Seconds until the whole bake's time is up, at least 0; infinite without a limit.
+    pub fn seconds_left(&self) -> f64 {
+        let limit = self.clock.limit.map_or(f64::INFINITY, |limit| limit.as_secs_f64());
+        (limit - self.seconds()).max(0.0)
+    }
+
     /// Ends the running stage and begins `stage`.
     ///
     /// # Errors
@@ -204,7 +213,8 @@ impl<'a> BakeMonitor<'a> {
     /// progress.
     pub fn pass(&mut self, share: f32) {
         let begin = if self.pass.1 < 1.0 { self.pass.1 } else { 0.0 };
-        self.pass = (begin, begin + (1.0 - begin) * share);
+        // After many passes rounding must not make the last one seem complete, or the next would begin at 0.
+        self.pass = (begin, (begin + (1.0 - begin) * share).min(MAX_PASS_END));
     }
 
     /// Writes the time of the running stage into the report.

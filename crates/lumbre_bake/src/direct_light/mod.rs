@@ -1,7 +1,8 @@
 //! Direct light of every covered texel. Sources that matter by themselves are sampled individually, in passes: a few
 //! shadow rays everywhere; many where the first pass saw a source partly, or saw other sources than a texel nearby,
 //! unless its result was exact (so the faint ends of a penumbra are found from their neighbours); then more where the
-//! requested error is not yet in reach. The other sources share samples: that is `shared_light`.
+//! requested error is not yet in reach. Under a time limit the later passes are made for one error after the other, from a
+//! coarse one to the requested one. Sources that do not matter by themselves share samples: that is `shared_light`.
 
 pub(crate) mod light_cuts;
 pub(crate) mod light_visibility;
@@ -70,10 +71,13 @@ pub(crate) fn direct_light(
     monitor.pass(PASS_OF_LOCAL_LIGHT);
     let local = LocalLight::new(sources, texels, so_far.as_ref().unwrap_or(&direct), monitor)?;
     let mut doubtful = sampler.doubtful_texels(&direct);
+    let mut seconds_of_last_goal = 0.0;
     for (step, error) in error_goals(options).into_iter().enumerate() {
-        if step > 0 && monitor.clock().is_past(LAST_STEP_BEGIN) {
+        if step > 0 && is_late_for_finer_goal(seconds_of_last_goal, monitor)? {
+            monitor.cut_short();
             break;
         }
+        let begun = monitor.seconds();
         let options = BakeOptions { error, ..*options };
         let goals = ErrorGoals::new(sources, texels, &options, shared.is_some());
         sampler.resample(&mut doubtful, &mut direct, options.effort().direct, monitor)?;
@@ -90,6 +94,7 @@ pub(crate) fn direct_light(
             let share = |samples: f64| goals.share_for(samples);
             shared.refine(&local, (share(0.0), &share), &goal, monitor)?;
         }
+        seconds_of_last_goal = monitor.seconds() - begun;
     }
     if let Some(shared) = shared {
         shared.add_to(&mut direct);
@@ -246,6 +251,9 @@ impl<'a> SourceSampler<'a> {
         direct: &mut [Direct],
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<usize, BakeError> {
+        if wanted.is_empty() {
+            return Ok(0);
+        }
         monitor.pass(PASS);
         let lights = in_chunks_until_deadline(wanted.len(), monitor, |index| {
             self.light(wanted[index].texel, wanted[index].samples)
@@ -270,18 +278,29 @@ struct DoubtfulTexels {
 /// the requested one: whenever the time is up, all texels are about equally good.
 fn error_goals(options: &BakeOptions) -> Vec<f64> {
     let mut goals = vec![options.error];
-    while options.time.is_some() && goals[goals.len() - 1] < COARSEST_GOAL {
+    while options.time.is_some() && goals[goals.len() - 1] < MIN_FIRST_GOAL {
         goals.push(2.0 * goals[goals.len() - 1]);
     }
     goals.reverse();
     goals
 }
 
-/// Under a time limit the first error to aim at is at least this one.
-const COARSEST_GOAL: f64 = 0.08;
-/// The share of the stage's time after which no finer error is aimed at: each half takes more time than all before, and
-/// the final gather makes better use of it.
-const LAST_STEP_BEGIN: f64 = 0.6;
+/// Under a time limit the first error to aim at is at least this one, and less than twice as large.
+const MIN_FIRST_GOAL: f64 = 0.08;
+
+/// Whether there is too little time to aim at half the error of the last goal, which took so many seconds. The answer is
+/// kept in the checkpoint, as it depends on the clock.
+fn is_late_for_finer_goal(seconds: f64, monitor: &mut BakeMonitor<'_>) -> Result<bool, BakeError> {
+    let is_late = TIME_OF_NEXT_GOAL * seconds > MAX_SHARE_OF_NEXT_GOAL * monitor.seconds_left();
+    Ok(in_chunks(1, monitor, |_| is_late)?.contains(&true))
+}
+
+/// How many times as long as a goal the next one takes, which allows half its error: a quarter of the squared error takes
+/// 4^(1 / [`ORDER`]) times the samples.
+const TIME_OF_NEXT_GOAL: f64 = 2.5;
+/// The greatest share of the time left that a goal may be expected to take. The rest is for the final gather, whose error
+/// falls more steeply with time.
+const MAX_SHARE_OF_NEXT_GOAL: f64 = 0.1;
 
 /// The light of a texel from a previous bake.
 fn known_light(known: &[Option<Direct>], texel: CoveredTexel) -> Option<Direct> {

@@ -103,7 +103,7 @@ pub(crate) struct SharedLight<'a> {
     most: u32,
     /// Per covered texel.
     sums: Vec<SampleSums>,
-    /// What `sums` give.
+    /// The smoothed light of `sums`; updated after every round.
     smoothed: SmoothedLight,
 }
 
@@ -240,7 +240,7 @@ impl<'a> SharedLight<'a> {
                 chosen_share = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
             }
             let goal = goal(chosen_share.unwrap_or(least));
-            if left <= goal * ENOUGH || is_stalled || monitor.clock().is_over() {
+            if left <= goal * ENOUGH || is_stalled {
                 return Ok(());
             }
             before = left;

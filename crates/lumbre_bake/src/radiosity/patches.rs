@@ -4,16 +4,14 @@
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use glam::{DMat2, DVec2, Vec3};
-use lumbre_scene::Image;
 use rayon::prelude::*;
 
 use super::bsp::{BspTrees, Corners, CutCell};
 use super::patch_index::PatchIndex;
 use crate::scene::mean_of_points::mean_of_points;
-use crate::scene::mip_level::MipLevel;
 use crate::visibility::contacts::{PlaneFrame, contacts};
 
 use crate::scene::material::Side;
@@ -80,14 +78,9 @@ pub(crate) struct Patches {
     pub warnings: Vec<String>,
 }
 
-/// Most texels of one texture along a patch's edge. If there are more, a mip level of it is read, so that none is missed.
-const MAX_LEVEL_TEXELS: f32 = 16.0;
-/// Points for each texel of such a level, along an edge: with one, a spot of a 256th of the texture counted 22 % too
-/// little.
-const POINTS_PER_LEVEL_TEXEL: f32 = 2.0;
-/// Most points along a patch's edge where two textures vary together, so that the mean of their product is not the
-/// product of their means: up to that there is one point per texel, so that bilinear filtering misses none.
-const MAX_POINTS: u32 = 64;
+/// Most points along a patch's edge at which textures are averaged. Up to that there is one per texel, so that bilinear
+/// filtering misses none.
+const MAX_TEXTURE_POINTS: u32 = 64;
 
 impl Patches {
     /// The mean of all patches, weighted by area, of the channels' mean; at most 0.999.
@@ -213,23 +206,19 @@ impl Patches {
 
     /// Finds what each patch reflects, and warns of textures that are too fine for the patches.
     fn find_reflectances(&mut self, scene: &BakeScene) {
-        let mut results = vec![(Vec3::ZERO, 0.0); self.list.len()];
-        for SharedLevel { level, patches } in self.by_mip_level(scene) {
-            let level = level.map(|(image, level)| MipLevel::new(image, level, &scene.stop));
-            let of_patch = |&patch: &PatchIndex| {
-                if scene.stop.is_cancelled() {
-                    return (Vec3::ZERO, 0.0);
-                }
-                self.reflectance_and_texels(scene, patch, level.as_ref())
-            };
-            let found: Vec<(Vec3, f32)> = patches.par_iter().map(of_patch).collect();
-            patches.iter().zip(found).for_each(|(patch, found)| results[patch.place()] = found);
-        }
+        let of_patch = |patch: &Patch| {
+            if scene.stop.is_cancelled() {
+                return (Vec3::ZERO, 0.0);
+            }
+            let corners = CORNERS.map(|at| self.point(patch, at));
+            reflectance_and_texels(scene, patch.triangle as usize, patch.side, &corners)
+        };
+        let results: Vec<(Vec3, f32)> = self.list.par_iter().map(of_patch).collect();
         // Per object with a patch that shows more texels than there are points, the most texels along a patch's edge.
         let mut most_texels: BTreeMap<u32, f32> = BTreeMap::new();
         for (patch, (reflectance, texels)) in self.list.iter_mut().zip(results) {
             patch.reflectance = reflectance;
-            if texels > MAX_POINTS as f32 {
+            if texels > MAX_TEXTURE_POINTS as f32 {
                 let most = most_texels.entry(scene.triangles[patch.triangle as usize].object).or_default();
                 *most = most.max(texels);
             }
@@ -244,62 +233,10 @@ impl Patches {
         self.warnings.extend(most_texels.into_iter().map(|(object, most)| {
             format!(
                 "{}: a patch of it shows up to {most:.0} texels of its textures along an edge; what bounces off it is the mean of \
-                 {MAX_POINTS} points along there, which may miss what is smaller",
+                 {MAX_TEXTURE_POINTS} points along there, which may miss what is smaller",
                 scene.names[object as usize]
             )
         }));
-    }
-
-    /// The patches, grouped by the mip level that their reflectance is read from.
-    fn by_mip_level<'a>(&self, scene: &'a BakeScene) -> Vec<SharedLevel<'a>> {
-        let level = |patch: &Patch| {
-            let surface = &scene.surfaces[scene.triangles[patch.triangle as usize].surface as usize];
-            let texture = surface.only_reflectance_texture()?;
-            let vertices = scene.triangles[patch.triangle as usize].vertices;
-            let texels = surface.reflectance_texels(vertices, CORNERS.map(|at| self.point(patch, at)));
-            let level = (texels / MAX_LEVEL_TEXELS).log2().ceil() as u32;
-            (level > 0).then_some((&*texture.image, level))
-        };
-        // Grouped by the image's address, but in the order of the list, so that nothing depends on addresses.
-        let mut groups: Vec<SharedLevel<'_>> = Vec::new();
-        let mut group_of = HashMap::new();
-        for (place, patch) in self.list.iter().enumerate() {
-            let level = level(patch);
-            let key = level.map(|(image, level)| (std::ptr::from_ref(image), level));
-            let group = *group_of.entry(key).or_insert(groups.len());
-            if group == groups.len() {
-                groups.push(SharedLevel { level, patches: Vec::new() });
-            }
-            groups[group].patches.push(PatchIndex::new(place));
-        }
-        groups
-    }
-
-    /// The mean reflectance of a patch, and the number of texels along its longest edge that points may have missed: 0
-    /// if it is read from a mip level.
-    fn reflectance_and_texels(
-        &self,
-        scene: &BakeScene,
-        patch: PatchIndex,
-        level: Option<&MipLevel>,
-    ) -> (Vec3, f32) {
-        let patch = &self.list[patch.place()];
-        let triangle = &scene.triangles[patch.triangle as usize];
-        let surface = &scene.surfaces[triangle.surface as usize];
-        let weights = |at: (f32, f32)| {
-            let (u, v) = self.point(patch, at);
-            [1.0 - u - v, u, v]
-        };
-        let texels = surface.reflectance_texels(triangle.vertices, CORNERS.map(|at| self.point(patch, at)));
-        if let Some(level) = level {
-            let texels = texels * (-(level.level as f32)).exp2();
-            let points = (POINTS_PER_LEVEL_TEXEL * texels).ceil() as u32;
-            let read = |at| surface.mean_reflectance(patch.side, triangle.vertices, weights(at), level);
-            return (mean_of_points(points, read), 0.0);
-        }
-        let points = if surface.varies() { (texels.ceil() as u32).clamp(2, MAX_POINTS) } else { 1 };
-        let read = |at| surface.reflectance(patch.side, triangle.vertices, weights(at));
-        (mean_of_points(points, read), texels)
     }
 
     /// The patch at a point of a triangle's side, given by barycentric weights; `None` where no light is received.
@@ -363,13 +300,6 @@ impl Patches {
 
 /// A patch is too coarse within this many times the length of its side.
 const NEAR_SIDES: f32 = 2.0;
-
-/// Patches whose reflectance is read from the same mip level.
-struct SharedLevel<'a> {
-    /// The image and its level; `None` for patches that read all texels, or no texture.
-    level: Option<(&'a Image, u32)>,
-    patches: Vec<PatchIndex>,
-}
 
 /// The cells of a triangle, and how contact lines cut some of them.
 struct TriangleCells {
@@ -492,6 +422,19 @@ fn area_share(corners: &Corners) -> f32 {
 /// The point of a triangle with the given corners at barycentric weights (u, v).
 fn point_between([a, b, c]: &Corners, u: f32, v: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
+}
+
+/// The mean reflectance of a part of a triangle, and the number of texels along its longest edge.
+fn reflectance_and_texels(scene: &BakeScene, index: usize, side: Side, corners: &Corners) -> (Vec3, f32) {
+    let triangle = &scene.triangles[index];
+    let surface = &scene.surfaces[triangle.surface as usize];
+    let texels = surface.reflectance_texels(triangle.vertices, *corners);
+    let points = if surface.varies() { (texels.ceil() as u32).clamp(2, MAX_TEXTURE_POINTS) } else { 1 };
+    let mean = mean_of_points(points, |(u, v)| {
+        let (u, v) = point_between(corners, u, v);
+        surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
+    });
+    (mean, texels)
 }
 
 /// The number of the cell at a point. Row `a` holds 2(n - a) - 1 cells, so the rows before it hold a(2n - a).

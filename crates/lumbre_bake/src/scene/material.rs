@@ -8,8 +8,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Material};
 use lumbre_scene::{MaterialTextures, TextureReference};
 
-use super::mip_level::MipLevel;
-use super::texture::{sample, sample_level};
+use super::texture::sample;
 
 /// Larger reflectances are clamped to this, with a warning: with a reflectance of 1, bounces would never end.
 pub(crate) const LARGEST_REFLECTANCE: f32 = 0.999;
@@ -86,41 +85,8 @@ impl SurfaceMaterial {
         }
     }
 
-    /// The texture that the reflectance is read from, if it is only one.
-    pub fn only_reflectance_texture(&self) -> Option<&TextureReference> {
-        let textures = self.textures.as_ref()?;
-        textures.base_color.as_ref().filter(|_| textures.metallic_roughness.is_none())
-    }
-
     /// Diffuse reflectance ρ, each channel in [0, 0.999].
     pub fn reflectance(&self, side: Side, vertices: [u32; 3], weights: [f32; 3]) -> Vec3 {
-        let base_color = |base: &TextureReference| self.read(base, vertices, weights, true).truncate();
-        self.reflectance_of(side, vertices, weights, base_color)
-    }
-
-    /// The mean reflectance around a point: the base colour is read from a mip level of its texture.
-    pub fn mean_reflectance(
-        &self,
-        side: Side,
-        vertices: [u32; 3],
-        weights: [f32; 3],
-        level: &MipLevel,
-    ) -> Vec3 {
-        let base_color = |base: &TextureReference| {
-            let uv = self.texture_coordinates(base, vertices, weights);
-            uv.map_or(Vec3::ONE, |uv| sample_level(base, uv, level))
-        };
-        self.reflectance_of(side, vertices, weights, base_color)
-    }
-
-    /// The reflectance where `base_color` reads the colour of the texture.
-    fn reflectance_of(
-        &self,
-        side: Side,
-        vertices: [u32; 3],
-        weights: [f32; 3],
-        base_color: impl Fn(&TextureReference) -> Vec3,
-    ) -> Vec3 {
         if self.material.unlit {
             return Vec3::ZERO;
         }
@@ -135,7 +101,7 @@ impl SurfaceMaterial {
                 diffuse = metallic.base_color * (1.0 - metallic.metallic * blue);
             }
             if let Some(base) = &textures.base_color {
-                diffuse *= base_color(base);
+                diffuse *= self.read(base, vertices, weights, true).truncate();
             }
         }
         diffuse *= self.color(vertices, weights).truncate();
@@ -181,22 +147,12 @@ impl SurfaceMaterial {
 
     /// The texture's value at a point of a triangle; white if the mesh lacks the coordinates.
     fn read(&self, texture: &TextureReference, vertices: [u32; 3], weights: [f32; 3], srgb: bool) -> Vec4 {
-        let uv = self.texture_coordinates(texture, vertices, weights);
-        uv.map_or(Vec4::ONE, |uv| sample(texture, uv, srgb))
-    }
-
-    /// The coordinates at which a texture is read at a point of a triangle; `None` if the mesh lacks them.
-    fn texture_coordinates(
-        &self,
-        texture: &TextureReference,
-        vertices: [u32; 3],
-        weights: [f32; 3],
-    ) -> Option<Vec2> {
         let coordinates = if texture.tex_coord == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
         if coordinates.is_empty() {
-            return None;
+            return Vec4::ONE;
         }
-        Some((0..3).map(|i| coordinates[vertices[i] as usize] * weights[i]).sum())
+        let uv: Vec2 = (0..3).map(|i| coordinates[vertices[i] as usize] * weights[i]).sum();
+        sample(texture, uv, srgb)
     }
 }
 

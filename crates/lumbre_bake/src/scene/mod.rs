@@ -12,7 +12,6 @@ mod leaks;
 mod lightmap_layout;
 pub(crate) mod material;
 pub(crate) mod mean_of_points;
-pub(crate) mod mip_level;
 mod occlusion;
 mod receiver;
 mod rooms;

@@ -1,52 +1,33 @@
-//! Reads a material's texture at a point with bilinear filtering and glTF's wrap modes and transform: the image itself,
-//! or a mip level of it.
+//! Reads a material's texture at a point with bilinear filtering and glTF's wrap modes and transform. There are no mip
+//! levels: patches and emitters average over several points instead.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec4};
 use lumbre_optics::decode_srgb_byte;
-use lumbre_scene::{Image, TextureReference, Wrap};
-
-use super::mip_level::MipLevel;
+use lumbre_scene::{TextureReference, Wrap};
 
 /// RGBA at texture coordinates; the colour channels are decoded from sRGB if `srgb` is set.
 pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
-    let image = &texture.image;
-    bilinear(texture, uv, (image.width, image.height), |x, y| texel(image, x, y, srgb)).unwrap_or(Vec4::ONE)
-}
-
-/// The colour at texture coordinates, read from a mip level of the texture's image.
-pub(crate) fn sample_level(texture: &TextureReference, uv: Vec2, level: &MipLevel) -> Vec3 {
-    let read = |x: usize, y: usize| level.texel(x, y).extend(1.0);
-    bilinear(texture, uv, (level.width, level.height), read).unwrap_or(Vec4::ONE).truncate()
-}
-
-/// A texel of an image; the colour channels are decoded from sRGB if `srgb` is set. White outside of the image.
-pub(super) fn texel(image: &Image, x: usize, y: usize, srgb: bool) -> Vec4 {
-    let first = 4 * (y * image.width as usize + x);
-    let Some(&[r, g, b, a]) = image.rgba.get(first..first + 4) else { return Vec4::ONE };
-    let channel = |value: u8| if srgb { decode_srgb_byte(value) as f32 } else { f32::from(value) / 255.0 };
-    Vec4::new(channel(r), channel(g), channel(b), f32::from(a) / 255.0)
-}
-
-/// Interpolates between the four texels around a point, of a level of this width and height; `None` where the texture
-/// coordinates are not finite.
-fn bilinear(
-    texture: &TextureReference,
-    uv: Vec2,
-    (width, height): (u32, u32),
-    read: impl Fn(usize, usize) -> Vec4,
-) -> Option<Vec4> {
     let uv = texture.transformed(uv);
     if !uv.is_finite() {
-        return None;
+        return Vec4::ONE;
     }
-    let at = uv * Vec2::new(width as f32, height as f32) - 0.5;
+    let image = &texture.image;
+    let size = Vec2::new(image.width as f32, image.height as f32);
+    let at = uv * size - 0.5;
     let low = at.floor();
     let fraction = at - low;
-    let [left, right] = [0.0, 1.0].map(|dx| wrap(low.x + dx, width, texture.sampler.wrap_u));
-    let [upper, lower] = [0.0, 1.0].map(|dy| wrap(low.y + dy, height, texture.sampler.wrap_v));
+    let [left, right] = [0.0, 1.0].map(|dx| wrap(low.x + dx, image.width, texture.sampler.wrap_u));
+    let [upper, lower] = [0.0, 1.0].map(|dy| wrap(low.y + dy, image.height, texture.sampler.wrap_v));
+    let read = |x: usize, y: usize| {
+        let first = 4 * (y * image.width as usize + x);
+        let Some(&[r, g, b, a]) = image.rgba.get(first..first + 4) else { return Vec4::ONE };
+        let channel =
+            |value: u8| if srgb { decode_srgb_byte(value) as f32 } else { f32::from(value) / 255.0 };
+        Vec4::new(channel(r), channel(g), channel(b), f32::from(a) / 255.0)
+    };
     let top = read(left, upper).lerp(read(right, upper), fraction.x);
     let bottom = read(left, lower).lerp(read(right, lower), fraction.x);
-    Some(top.lerp(bottom, fraction.y))
+    top.lerp(bottom, fraction.y)
 }
 
 /// The column or row inside the image that `index` wraps to.
@@ -71,7 +52,7 @@ fn wrap(index: f32, size: u32, wrap: Wrap) -> usize {
 mod tests {
     use std::sync::Arc;
 
-    use lumbre_scene::Sampler;
+    use lumbre_scene::{Image, Sampler};
 
     use super::*;
 
