@@ -117,6 +117,11 @@ impl Clock {
         wanted.min(taken.saturating_add(more as u32))
     }
 
+    /// Returns true if so many seconds are left; always true without a limit.
+    pub fn has_left(&self, seconds: f64) -> bool {
+        self.limit.is_none_or(|limit| self.seconds() + seconds <= limit.as_secs_f64())
+    }
+
     /// Returns true if `share` of the time limit has passed; never true without a limit.
     pub fn is_past(&self, share: f64) -> bool {
         self.until(share).is_over()
@@ -190,12 +195,6 @@ impl<'a> BakeMonitor<'a> {
     /// Seconds that the bake has taken, including those of interrupted bakes that it resumes.
     pub fn seconds(&self) -> f64 {
         self.clock.seconds()
-    }
-
-    /// Seconds until the whole bake's time is up, at least 0; infinite without a limit.
-    pub fn seconds_left(&self) -> f64 {
-        let limit = self.clock.limit.map_or(f64::INFINITY, |limit| limit.as_secs_f64());
-        (limit - self.seconds()).max(0.0)
     }
 
     /// Ends the running stage and begins `stage`.

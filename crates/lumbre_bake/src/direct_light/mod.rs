@@ -291,16 +291,13 @@ const MIN_FIRST_GOAL: f64 = 0.08;
 /// Whether there is too little time to aim at half the error of the last goal, which took so many seconds. The answer is
 /// kept in the checkpoint, as it depends on the clock.
 fn is_late_for_finer_goal(seconds: f64, monitor: &mut BakeMonitor<'_>) -> Result<bool, BakeError> {
-    let is_late = TIME_OF_NEXT_GOAL * seconds > MAX_SHARE_OF_NEXT_GOAL * monitor.seconds_left();
+    let is_late = !monitor.clock().has_left(TIME_OF_NEXT_GOAL * seconds);
     Ok(in_chunks(1, monitor, |_| is_late)?.contains(&true))
 }
 
 /// How many times as long as a goal the next one takes, which allows half its error: a quarter of the squared error takes
 /// 4^(1 / [`ORDER`]) times the samples.
 const TIME_OF_NEXT_GOAL: f64 = 2.5;
-/// The greatest share of the time left that a goal may be expected to take. The rest is for the final gather, whose error
-/// falls more steeply with time.
-const MAX_SHARE_OF_NEXT_GOAL: f64 = 0.1;
 
 /// The light of a texel from a previous bake.
 fn known_light(known: &[Option<Direct>], texel: CoveredTexel) -> Option<Direct> {
