@@ -411,6 +411,22 @@ mod tests {
     }
 
     #[test]
+    fn progress_never_goes_back_however_many_passes_a_stage_has() {
+        let mut fractions = Vec::new();
+        let mut callback = |progress: Progress| {
+            fractions.push(progress.stage_fraction);
+            ControlFlow::Continue(())
+        };
+        let mut monitor = BakeMonitor::new(&mut callback, None);
+        for _ in 0..100 {
+            monitor.pass(0.5);
+            monitor.advance(0.5).unwrap();
+            monitor.advance(1.0).unwrap();
+        }
+        assert!(fractions.is_sorted() && fractions.iter().all(|fraction| *fraction <= 1.0), "{fractions:?}");
+    }
+
+    #[test]
     fn quick_work_makes_no_callback_and_progress_carries_the_error() {
         let mut errors = Vec::new();
         let mut callback = |progress: Progress| {

@@ -86,6 +86,23 @@ fn resumed_after_any_interruption_it_ends_with_the_same_bits() {
 }
 
 #[test]
+fn what_a_time_limit_has_decided_is_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint");
+    // Time for everything, but direct light takes its goals one after the other.
+    let timed = BakeOptions { time: Some(Duration::from_secs(3600)), ..options() };
+    let (expected, report) = whole(&timed);
+    for stop in [0.1, 0.2, 0.3, 0.42, 0.6] {
+        let (_, result) = interrupted(&checkpoint(&path, false), &timed, stop);
+        assert!(matches!(result, Err(BakeError::Cancelled { .. })), "{stop}: {result:?}");
+        let (mut world, result) = interrupted(&checkpoint(&path, true), &timed, NEVER);
+        // A checkpoint that does not fit would be named in a warning.
+        assert_eq!(result.unwrap().warnings, report.warnings, "{stop}");
+        assert!(bits(&mut world) == expected, "other bits after an interruption at {stop}");
+    }
+}
+
+#[test]
 fn every_stage_can_be_interrupted_in_its_middle() {
     // The stage of each progress call; each call is a chance to interrupt the bake.
     let mut calls = Vec::new();

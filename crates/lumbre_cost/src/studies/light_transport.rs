@@ -21,14 +21,12 @@ use crate::scenes::Air;
 use crate::traced::{ray_tree, traced};
 use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
-/// Numbers of paths per pixel.
+/// Numbers of paths per pixel. The second one is that of paths that are cut short.
 const PATHS: &[u32] = &[4, 8, 16];
 const FEW_PATHS: &[u32] = &[2, 6];
 /// Numbers of reflections after which paths are cut short.
 const BOUNCES: &[u32] = &[0, 1, 2, 4];
 const FEW_BOUNCES: &[u32] = &[0, 2];
-/// Numbers of paths per pixel that are cut short, in a full and in a quick report.
-const CUT_SHORT: [u32; 2] = [8, 6];
 const REFLECTIONS: &str = "reflections on the way";
 /// Factor by which pictures are smaller along each side than in other studies, as path tracing takes long.
 const SMALLER: u32 = 3;
@@ -152,8 +150,7 @@ fn of_scene(
     let trees = [1, 4].map(|samples| ("ray tree", tree(samples), samples, format!("--samples {samples}")));
     let numbers = conditions.unless_quick(PATHS, FEW_PATHS).iter();
     let all = numbers.map(|n| ("paths", paths(*n), *n, format!("--integrator path --samples {n}")));
-    let [samples, few_samples] = CUT_SHORT;
-    let samples = conditions.unless_quick(samples, few_samples);
+    let samples = conditions.unless_quick(PATHS, FEW_PATHS)[1];
     let bounces = conditions.unless_quick(BOUNCES, FEW_BOUNCES).iter().map(|&depth| {
         let asked = format!("--integrator path --samples {samples} --depth {depth}");
         (CUT, TraceOptions { depth: Some(depth), ..paths(samples) }, samples, asked)
