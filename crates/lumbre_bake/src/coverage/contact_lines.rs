@@ -27,6 +27,11 @@ impl ContactLines {
         size_of_val(&self.0[..]) as u64
     }
 
+    /// All lines, ordered by texel.
+    pub fn iter(&self) -> impl Iterator<Item = &(MapTexel, [DVec2; 2])> {
+        self.0.iter()
+    }
+
     /// Returns true if a line crosses the segment between two places of a map, in texels.
     pub fn separate(&self, map: &MapLayout, [from, to]: [Vec2; 2]) -> bool {
         let (low, high) = (from.min(to).max(Vec2::ZERO).as_uvec2(), from.max(to).max(Vec2::ZERO).as_uvec2());
@@ -34,15 +39,15 @@ impl ContactLines {
             (low.x..=high.x.min(map.width - 1)).any(|x| {
                 let corner = DVec2::new(f64::from(x), f64::from(y));
                 let segment = [from, to].map(|place| place.as_dvec2() - corner);
-                self.in_texel(map.texel(x, y)).iter().any(|(_, line)| cross(*line, segment))
+                self.in_texel(map.texel(x, y)).any(|line| cross(line, segment))
             })
         })
     }
 
-    fn in_texel(&self, texel: MapTexel) -> &[(MapTexel, [DVec2; 2])] {
+    /// The lines in a texel, each as a segment in its unit square.
+    pub fn in_texel(&self, texel: MapTexel) -> impl Iterator<Item = [DVec2; 2]> {
         let first = self.0.partition_point(|(other, _)| *other < texel);
-        let count = self.0[first..].iter().take_while(|(other, _)| *other == texel).count();
-        &self.0[first..first + count]
+        self.0[first..].iter().take_while(move |(other, _)| *other == texel).map(|(_, line)| *line)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::charts::charts;
 use super::contact_lines::ContactLines;
-use super::divided_texels::{crossed_texels, divided_texels};
+use super::divided_texels::{contact_lines, divided_texels};
 use super::footprint::{Texel, footprints};
 use super::hidden::remove_hidden;
 use crate::monitor::BakeMonitor;
@@ -35,28 +35,21 @@ impl<'a> CoveredTexels<'a> {
         monitor: &mut BakeMonitor<'_>,
         report: &mut BakeReport,
     ) -> Result<Self, BakeError> {
-        let (mut list, charts, crossed) = monitor.run_interruptible(0.0, || {
-            (footprints(scene, layout), charts(scene), crossed_texels(scene, layout))
+        let (mut list, charts, contacts) = monitor.run_interruptible(0.0, || {
+            (footprints(scene, layout), charts(scene), contact_lines(scene, layout))
         })?;
-        // Divided texels are found twice: first from the whole footprints, to know which texels to classify point by
-        // point, and again from the footprints that are left once hidden parts are removed.
+        // Divided texels are found twice: first from the whole footprints, as they may hide something that rays miss,
+        // and again from the footprints that are left once hidden parts are removed.
         let maybe_divided: Vec<MapTexel> = monitor.run_interruptible(0.0, || {
-            let divided = divided_texels(layout, &list, &crossed);
+            let divided = divided_texels(layout, &list, &contacts);
             divided.iter().map(|texel| list[texel.place()].index).collect()
         })?;
-        (report.hidden_texels, report.rays) = remove_hidden(
-            scene,
-            layout,
-            &mut list,
-            crossed.iter().map(|(texel, _)| *texel),
-            &maybe_divided,
-            monitor,
-        )?;
-        let divided = monitor.run_interruptible(1.0, || divided_texels(layout, &list, &crossed))?;
+        (report.hidden_texels, report.rays) =
+            remove_hidden(scene, layout, &mut list, &contacts, &maybe_divided, monitor)?;
+        let divided = monitor.run_interruptible(1.0, || divided_texels(layout, &list, &contacts))?;
         report.texels = layout.texels;
         report.coverage = list.len() as f64 / layout.texels.max(1) as f64;
         let area: f64 = scene.triangles.iter().map(|triangle| f64::from(triangle.area)).sum();
-        let contacts = ContactLines::new(crossed);
         let side = (area / list.len().max(1) as f64).sqrt() as f32;
         Ok(Self { layout, list, charts, divided, contacts, side })
     }

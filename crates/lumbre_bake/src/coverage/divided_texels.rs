@@ -6,8 +6,9 @@
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
+use super::contact_lines::ContactLines;
 use super::footprint::{Footprint, Texel};
-use crate::scene::{BakeScene, LightmapLayout};
+use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::visibility::clipping::clip_segment;
 use crate::visibility::contacts::{PlaneFrame, contacts};
@@ -17,39 +18,45 @@ const MIN_LENGTH: f64 = 0.25;
 /// Distance from a line, in texels, up to which a point counts as on the line and not beyond it.
 const MARGIN: f64 = 0.05;
 
-/// The texels that contact lines cross, in ascending order, each with the segment of the line in the texel's unit
-/// square.
-pub(crate) fn crossed_texels(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(MapTexel, [DVec2; 2])> {
+/// The contact lines on everything that the maps show, except on triangles for which [`has_area_for_lines`] is false.
+pub(crate) fn contact_lines(scene: &BakeScene, layout: &LightmapLayout) -> ContactLines {
     let mut lines: Vec<(MapTexel, [DVec2; 2])> = (0..scene.triangles.len())
         .into_par_iter()
         .flat_map_iter(|index| texels_crossed_on(scene, layout, index))
         .collect();
     // Where a mesh is as fine as its texels there are millions of lines to sort.
     if scene.stop.is_cancelled() {
-        return Vec::new();
+        return ContactLines::default();
     }
     lines.par_sort_by_key(|(texel, _)| *texel);
-    lines
+    ContactLines::new(lines)
 }
 
 /// Those of the crossed texels that their contact lines divide, in ascending order.
 pub(crate) fn divided_texels(
     layout: &LightmapLayout,
     texels: &[Texel],
-    crossed: &[(MapTexel, [DVec2; 2])],
+    contacts: &ContactLines,
 ) -> Vec<CoveredTexel> {
     let mut covered = vec![None; layout.texels];
     for (place, texel) in texels.iter().enumerate() {
         covered[texel.index.place()] = Some(CoveredTexel::new(place));
     }
     let mut divided: Vec<CoveredTexel> = Vec::new();
-    for &(index, line) in crossed {
+    for &(index, line) in contacts.iter() {
         let Some(texel) = covered[index.place()] else { continue };
         if divided.last() != Some(&texel) && is_divided(&texels[texel.place()], line) {
             divided.push(texel);
         }
     }
     divided
+}
+
+/// Whether contact lines on a triangle are searched for: it is at least as large as a texel.
+pub(crate) fn has_area_for_lines(triangle: &SceneTriangle) -> bool {
+    let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
+    let doubled_area = (b - a).perp_dot(c - a).abs();
+    doubled_area.is_finite() && doubled_area > 2.0
 }
 
 /// The texels that contact lines on a triangle cross, each with the segment of the line in the texel's unit square.
@@ -60,14 +67,11 @@ fn texels_crossed_on(
 ) -> Vec<(MapTexel, [DVec2; 2])> {
     let triangle = &scene.triangles[index];
     let map = &layout.maps[triangle.object as usize];
-    let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
-    let doubled_area = (b - a).perp_dot(c - a).abs();
-    if triangle.is_hidden_duplicate
-        || scene.stop.is_cancelled()
-        || !(doubled_area.is_finite() && doubled_area > 2.0)
-    {
+    if triangle.is_hidden_duplicate || scene.stop.is_cancelled() || !has_area_for_lines(triangle) {
         return Vec::new();
     }
+    let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
+    let doubled_area = (b - a).perp_dot(c - a).abs();
     let side = (2.0 * f64::from(triangle.area) / doubled_area).sqrt();
     let frame = PlaneFrame::new(triangle);
     let [p, q, r] = triangle.corners.map(|corner| frame.flat(corner.as_dvec3()));
@@ -170,7 +174,7 @@ mod tests {
         let options = BakeOptions { density: Density::TexelsPerMeter(8.0), ..BakeOptions::default() };
         let (layout, scene) = laid_out(&input.objects, input.space(), &options);
         let mut texels: Vec<MapTexel> =
-            super::crossed_texels(&scene, &layout).into_iter().map(|(texel, _)| texel).collect();
+            super::contact_lines(&scene, &layout).iter().map(|(texel, _)| *texel).collect();
         texels.dedup();
         texels.len()
     }

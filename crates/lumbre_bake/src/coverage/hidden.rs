@@ -3,10 +3,12 @@
 //! half under a box has the light of its open half. The result is independent of the bake's seed, unless the time is
 //! too short to classify all texels exactly.
 
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::contact_lines::ContactLines;
+use super::divided_texels::has_area_for_lines;
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
 use super::texel_geometry::{bounding_area, positions_of};
 use super::texel_groups::TexelGroups;
@@ -26,12 +28,14 @@ const MIN_CLEARANCE: f32 = 1.0 / 64.0;
 
 /// Rays per texel that decide whether it is suspicious, so that its points are classified one by one.
 const PROBES: u32 = 6;
-/// Rays per tile whose space in front no geometry crosses.
+/// Rays per tile that is hidden or open throughout.
 const TILE_PROBES: u32 = 16;
 /// Rays per texel once the time for exact classification is up.
 const LATE_PROBES: u32 = 2;
 /// Rays per point that classify it as open or hidden.
 const POINT_RAYS: u32 = 8;
+/// Distance from a contact line, in texels, below which a point is classified by itself.
+const LINE_MARGIN: f64 = 0.05;
 /// Rays that must be clear for an open point if another is blocked: where faces touch, a single ray may slip out
 /// between them.
 const MIN_CLEAR: u32 = 2;
@@ -46,7 +50,7 @@ const ALWAYS_EXACT: usize = 4096;
 const PASSES: [f32; 2] = [0.1, 0.2];
 
 /// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast.
-/// Contact lines cross the texels in `crossed`, and divide those in `divided`.
+/// `contacts` divide the texels in `divided`.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -54,14 +58,12 @@ pub(crate) fn remove_hidden(
     scene: &BakeScene,
     layout: &LightmapLayout,
     texels: &mut [Texel],
-    crossed: impl Iterator<Item = MapTexel>,
+    contacts: &ContactLines,
     divided: &[MapTexel],
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(usize, u64), BakeError> {
     let clock = monitor.clock().until(EXACT_TIME_SHARE);
-    let (suspicious, mut rays) = suspicious_texels(scene, texels, clock, monitor)?;
-    let mut is_crossed = vec![false; layout.texels];
-    crossed.for_each(|texel| is_crossed[texel.place()] = true);
+    let (suspicious, mut rays) = suspicious_texels(scene, layout, texels, contacts, clock, monitor)?;
     let mut is_suspect = vec![false; layout.texels];
     divided.iter().for_each(|texel| is_suspect[texel.place()] = true);
     // The few rays of a texel may miss a hidden corner that its neighbours' rays have found.
@@ -77,7 +79,7 @@ pub(crate) fn remove_hidden(
         if place >= ALWAYS_EXACT && clock.is_over() {
             classify_roughly(scene, texel)
         } else {
-            classify(scene, texel, is_crossed[texel.index.place()])
+            classify(scene, texel, contacts)
         }
     })?;
     rays += classified.iter().map(|points| u64::from(points.rays)).sum::<u64>();
@@ -95,16 +97,25 @@ fn min_clearance(scene: &BakeScene, texel: &Texel) -> f32 {
     MIN_CLEARANCE * triangle_side.min(texel.side(scene))
 }
 
-/// Whether each texel is suspicious, and the rays cast. Where no geometry crosses the space in front of a tile, all of
-/// the tile is inside a solid or none of it, and a few rays for the whole tile decide.
+/// Whether each texel is suspicious, and the rays cast. A tile that is hidden or open throughout needs only a few rays.
 fn suspicious_texels(
     scene: &BakeScene,
+    layout: &LightmapLayout,
     texels: &[Texel],
+    contacts: &ContactLines,
     clock: Clock,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(Vec<bool>, u64), BakeError> {
     let tiles = TexelGroups::tiles(texels);
-    let suspicious_tiles = monitor.run_interruptible(0.0, || suspicious_tiles(scene, texels, &tiles))?;
+    let mut is_crossed = vec![false; layout.texels];
+    contacts.iter().for_each(|(texel, _)| is_crossed[texel.place()] = true);
+    let suspicious_tiles = monitor.run_interruptible(0.0, || {
+        let is_suspicious = |members: &Vec<u32>| {
+            let members: Vec<&Texel> = members.iter().map(|&place| &texels[place as usize]).collect();
+            is_suspicious_tile(scene, &members, &is_crossed)
+        };
+        tiles.members.par_iter().map(is_suspicious).collect::<Vec<bool>>()
+    })?;
     let must_probe = |place: usize| suspicious_tiles[tiles.group_of[place] as usize];
     monitor.pass(PASSES[0]);
     let suspicious = in_chunks(texels.len(), monitor, |place| {
@@ -116,26 +127,30 @@ fn suspicious_texels(
     Ok((suspicious, rays))
 }
 
-/// Whether the texels of each tile have to be probed one by one.
-fn suspicious_tiles(scene: &BakeScene, texels: &[Texel], tiles: &TexelGroups) -> Vec<bool> {
-    tiles
-        .members
-        .par_iter()
-        .map(|members| {
-            if scene.stop.is_cancelled() {
-                return false;
-            }
-            let members: Vec<&Texel> = members.iter().map(|&place| &texels[place as usize]).collect();
-            let mut positions = Vec::new();
-            members.iter().for_each(|texel| positions_of(scene, texel, &mut positions));
-            let area = members.first().and_then(|first| bounding_area(scene, first.triangle, &positions));
-            let is_free = area.is_some_and(|area| is_free_before(&area, scene));
-            let probed =
-                (0..TILE_PROBES).map(|ray| members[ray as usize * members.len() / TILE_PROBES as usize]);
-            let is_clear = |(ray, texel): (usize, &Texel)| probe(scene, texel, ray as u32) == Probe::Clear;
-            !(is_free && probed.enumerate().all(is_clear))
-        })
-        .collect()
+/// Whether the texels of a tile have to be probed one by one: unless it is all hidden or all open, and a few rays for
+/// the whole tile are clear.
+fn is_suspicious_tile(scene: &BakeScene, members: &[&Texel], is_crossed: &[bool]) -> bool {
+    if scene.stop.is_cancelled() {
+        return false;
+    }
+    let probed = (0..TILE_PROBES).map(|ray| members[ray as usize * members.len() / TILE_PROBES as usize]);
+    let is_clear = |(ray, texel): (usize, &Texel)| probe(scene, texel, ray as u32) == Probe::Clear;
+    let is_uniform = is_between_contacts(scene, members, is_crossed) || is_free_tile(scene, members);
+    !(is_uniform && probed.enumerate().all(is_clear))
+}
+
+/// Whether all contact lines on the triangle of a tile are known, and none crosses the tile.
+fn is_between_contacts(scene: &BakeScene, members: &[&Texel], is_crossed: &[bool]) -> bool {
+    members.first().is_some_and(|first| has_area_for_lines(&scene.triangles[first.triangle as usize]))
+        && !members.iter().any(|texel| is_crossed[texel.index.place()])
+}
+
+/// Whether no geometry crosses the space in front of a tile.
+fn is_free_tile(scene: &BakeScene, members: &[&Texel]) -> bool {
+    let mut positions = Vec::new();
+    members.iter().for_each(|texel| positions_of(scene, texel, &mut positions));
+    let area = members.first().and_then(|first| bounding_area(scene, first.triangle, &positions));
+    area.is_some_and(|area| is_free_before(&area, scene))
 }
 
 /// The outcome of a ray from a texel.
@@ -197,35 +212,65 @@ fn fine_points(scene: &BakeScene, texel: &Texel) -> Option<Vec<FootprintPoint>> 
     }
 }
 
-/// Classifies the points of a texel. Between contact lines a surface is either hidden or open throughout, so where none
-/// crosses the texel, and its corners and middle agree, they decide for all points.
-fn classify(scene: &BakeScene, texel: &Texel, is_crossed: bool) -> OpenPoints {
+/// Classifies the points of a texel. Between contact lines a surface is either hidden or open throughout, so where the
+/// corners and the middle of what lies between them agree, they decide for all points there.
+fn classify(scene: &BakeScene, texel: &Texel, contacts: &ContactLines) -> OpenPoints {
     let Some(points) = fine_points(scene, texel) else { return OpenPoints::default() };
     let sequence = Sequence::new(SEED, Stream::HiddenView, texel.index.0);
     let clearance = min_clearance(scene, texel);
     let mut rays = 0;
-    let mut is_open = |index: usize| {
-        let (is_open, cast) = is_point_open(scene, &points[index], sequence, index as u32, clearance);
+    let mut view_from = |index: usize| {
+        let (view, cast) = point_view(scene, &points[index], sequence, index as u32, clearance);
         rays += cast;
-        is_open
+        view
     };
-    let key_points = if is_crossed { Vec::new() } else { corners_and_middle(&points) };
-    let key_results: Vec<bool> = key_points.into_iter().map(&mut is_open).collect();
-    let agreed =
-        key_results.first().copied().filter(|first| key_results.iter().all(|result| result == first));
     let mut open = vec![0u64; points.len().div_ceil(64)];
     let mut all_open = true;
-    for index in 0..points.len() {
-        if agreed.unwrap_or_else(|| is_open(index)) {
-            open[index / 64] |= 1 << (index % 64);
-        } else {
-            all_open = false;
+    for group in between_lines(&points, contacts.in_texel(texel.index)) {
+        let views: Vec<PointView> =
+            corners_and_middle(&points, &group).into_iter().map(&mut view_from).collect();
+        let agreed = common_view(&views);
+        for index in group {
+            if agreed.unwrap_or_else(|| view_from(index)) == PointView::Open {
+                open[index / 64] |= 1 << (index % 64);
+            } else {
+                all_open = false;
+            }
         }
     }
     if all_open {
         open.clear();
     }
     OpenPoints { open, rays }
+}
+
+/// The view that all points have, if they agree. Those that saw only back faces side with the others: where the open is
+/// seen through few gaps, the rays of most points miss it.
+fn common_view(views: &[PointView]) -> Option<PointView> {
+    let mut certain = views.iter().copied().filter(|view| *view != PointView::BackFaces);
+    let Some(first) = certain.next() else { return Some(PointView::BackFaces) };
+    certain.all(|view| view == first).then_some(first)
+}
+
+/// The points of a footprint, by index, in groups that no contact line divides. A point on a line is a group of its own.
+/// The lines count as if they had no ends.
+fn between_lines(points: &[FootprintPoint], lines: impl Iterator<Item = [DVec2; 2]>) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = vec![(0..points.len()).collect()];
+    for [from, to] in lines {
+        let Some(along) = (to - from).try_normalize() else { continue };
+        let beyond = |index: &usize| along.perp_dot(points[*index].offset.as_dvec2() - from);
+        groups = groups
+            .into_iter()
+            .flat_map(|group| {
+                let (on_line, beside): (Vec<usize>, Vec<usize>) =
+                    group.into_iter().partition(|index| beyond(index).abs() < LINE_MARGIN);
+                let (left, right) = beside.into_iter().partition(|index| beyond(index) > 0.0);
+                on_line.into_iter().map(|index| vec![index]).chain([left, right])
+            })
+            .filter(|group| !group.is_empty())
+            .collect();
+    }
+    groups
 }
 
 /// Classifies all points of a texel alike: as open if at least half of its probe rays are clear.
@@ -254,26 +299,40 @@ fn keep_open(scene: &BakeScene, texel: &mut Texel, classified: &OpenPoints) -> b
     true
 }
 
-/// The indices of the points of a footprint that are nearest to the corners and the middle of the texel's square.
-fn corners_and_middle(points: &[FootprintPoint]) -> Vec<usize> {
+/// Those of a group of points of a footprint, by index, that are nearest to the corners and the middle of the texel's
+/// square.
+fn corners_and_middle(points: &[FootprintPoint], group: &[usize]) -> Vec<usize> {
     let places = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE, Vec2::splat(0.5)];
     let nearest = |place: Vec2| {
         let distance = |index: &usize| points[*index].offset.distance_squared(place);
-        (0..points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        group.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b)))
     };
-    places.into_iter().filter_map(nearest).collect()
+    let mut nearest: Vec<usize> = places.into_iter().filter_map(nearest).collect();
+    nearest.sort_unstable();
+    nearest.dedup();
+    nearest
 }
 
-/// Whether a point is in the open, and the rays cast: fewer than [`POINT_RAYS`] where the first ones decide. The point
-/// is hidden if half of its rays hit the inside of a solid, or if too few are clear: none, or fewer than [`MIN_CLEAR`]
-/// where some are blocked.
-fn is_point_open(
+/// What the rays from a point say of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum PointView {
+    Open,
+    /// It is inside a solid, or pressed against another surface.
+    Hidden,
+    /// All rays hit back faces. Taken by itself, the point counts as hidden.
+    BackFaces,
+}
+
+/// The view of a point, and the rays cast: fewer than [`POINT_RAYS`] where the first ones decide. The point is hidden if
+/// half of its rays hit the inside of a solid, or if too few are clear: none, or fewer than [`MIN_CLEAR`] where some are
+/// blocked.
+fn point_view(
     scene: &BakeScene,
     point: &FootprintPoint,
     sequence: Sequence,
     index: u32,
     clearance: f32,
-) -> (bool, u32) {
+) -> (PointView, u32) {
     let receiver = receiver(scene, point);
     let (mut inside, mut blocked, mut clear) = (0, 0, 0);
     for ray in 0..POINT_RAYS {
@@ -282,17 +341,58 @@ fn is_point_open(
             SurfaceHit::Inside => inside += 1,
             SurfaceHit::Back => {}
             SurfaceHit::Lit { distance, .. } if distance < clearance => blocked += 1,
-            SurfaceHit::Lit { .. } => clear += 1,
-            SurfaceHit::None => clear += 1,
+            SurfaceHit::Lit { .. } | SurfaceHit::None => clear += 1,
         }
         let cast = ray + 1;
         if 2 * inside >= POINT_RAYS {
-            return (false, cast);
+            return (PointView::Hidden, cast);
         }
         let enough = if blocked > 0 { MIN_CLEAR } else { 1 };
         if 2 * (cast - inside) > POINT_RAYS && clear >= enough {
-            return (true, cast);
+            return (PointView::Open, cast);
         }
     }
-    (false, POINT_RAYS)
+    let view = if inside + blocked + clear == 0 { PointView::BackFaces } else { PointView::Hidden };
+    (view, POINT_RAYS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The points of a footprint that fills its texel.
+    fn grid() -> Vec<FootprintPoint> {
+        let offset = |cell: u32| (Vec2::new((cell % FINE) as f32, (cell / FINE) as f32) + 0.5) / FINE as f32;
+        let point = |cell| FootprintPoint { triangle: 0, at: (0.0, 0.0), offset: offset(cell) };
+        (0..FINE * FINE).map(point).collect()
+    }
+
+    #[test]
+    fn contact_lines_divide_the_points_of_a_texel() {
+        let points = grid();
+        let sizes = |lines: &[[DVec2; 2]]| -> Vec<usize> {
+            let groups = between_lines(&points, lines.iter().copied());
+            let mut all: Vec<usize> = groups.iter().flatten().copied().collect();
+            all.sort_unstable();
+            assert_eq!(all, (0..points.len()).collect::<Vec<_>>(), "each point is in one group");
+            groups.iter().map(Vec::len).filter(|size| *size > 1).collect()
+        };
+        // The columns are at 1/16, 3/16, ...: the fourth is on the line at 0.4375, none on the one at 0.25.
+        let upright = |x: f64| [DVec2::new(x, 0.2), DVec2::new(x, 0.9)];
+        let level = |y: f64| [DVec2::new(0.1, y), DVec2::new(0.6, y)];
+        assert_eq!(sizes(&[]), [64]);
+        assert_eq!(sizes(&[upright(0.25)]), [16, 48]);
+        assert_eq!(sizes(&[upright(0.4375)]), [24, 32]);
+        assert_eq!(sizes(&[upright(0.25), level(0.5)]), [8, 8, 24, 24]);
+        assert_eq!(sizes(&[[DVec2::splat(0.5); 2]]), [64], "a line without length divides nothing");
+    }
+
+    #[test]
+    fn points_that_see_only_back_faces_side_with_the_others() {
+        use PointView::{BackFaces, Hidden, Open};
+        assert_eq!(common_view(&[Open, BackFaces, Open]), Some(Open));
+        assert_eq!(common_view(&[BackFaces, Hidden]), Some(Hidden));
+        assert_eq!(common_view(&[BackFaces, BackFaces]), Some(BackFaces));
+        assert_eq!(common_view(&[Open, BackFaces, Hidden]), None);
+    }
 }

@@ -117,7 +117,7 @@ pub(crate) fn mean_reflectances(
         let triangle = &scene.triangles[point.triangle as usize];
         let surface = &scene.surfaces[triangle.surface as usize];
         let is_uniform = patches.reflectance(point.triangle, Side::Front).is_some();
-        if scene.stop.is_cancelled() || is_uniform || surface.is_masked() {
+        if scene.stop.is_cancelled() || is_uniform || scene.is_masked(point.triangle) {
             return None;
         }
         let (u, v) = point.at;

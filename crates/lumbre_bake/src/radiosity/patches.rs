@@ -14,7 +14,7 @@ use super::patch_index::PatchIndex;
 use crate::scene::mean_of_points::mean_of_points;
 use crate::visibility::contacts::{PlaneFrame, contacts};
 
-use crate::scene::material::Side;
+use crate::scene::material::{ShownTexels, Side};
 use crate::scene::{BakeScene, SceneTriangle};
 
 /// One side of one piece of a triangle.
@@ -78,9 +78,10 @@ pub(crate) struct Patches {
     pub warnings: Vec<String>,
 }
 
-/// Most points along a patch's edge at which textures are averaged. Up to that there is one per texel, so that bilinear
-/// filtering misses none.
+/// Most points along a patch's edge at which textures are averaged.
 const MAX_TEXTURE_POINTS: u32 = 64;
+/// Texels along a patch's edge up to which each of them has a point.
+const FEW_TEXELS: f32 = 16.0;
 
 impl Patches {
     /// The mean of all patches, weighted by area, of the channels' mean; at most 0.999.
@@ -208,17 +209,17 @@ impl Patches {
     fn find_reflectances(&mut self, scene: &BakeScene) {
         let of_patch = |patch: &Patch| {
             if scene.stop.is_cancelled() {
-                return (Vec3::ZERO, 0.0);
+                return (Vec3::ZERO, None);
             }
             let corners = CORNERS.map(|at| self.point(patch, at));
             reflectance_and_texels(scene, patch.triangle as usize, patch.side, &corners)
         };
-        let results: Vec<(Vec3, f32)> = self.list.par_iter().map(of_patch).collect();
-        // Per object with a patch that shows more texels than there are points, the most texels along a patch's edge.
+        let results: Vec<(Vec3, Option<f32>)> = self.list.par_iter().map(of_patch).collect();
+        // Per object with a patch that shows too many texels, the most texels along a patch's edge.
         let mut most_texels: BTreeMap<u32, f32> = BTreeMap::new();
         for (patch, (reflectance, texels)) in self.list.iter_mut().zip(results) {
             patch.reflectance = reflectance;
-            if texels > MAX_TEXTURE_POINTS as f32 {
+            if let Some(texels) = texels {
                 let most = most_texels.entry(scene.triangles[patch.triangle as usize].object).or_default();
                 *most = most.max(texels);
             }
@@ -424,17 +425,31 @@ fn point_between([a, b, c]: &Corners, u: f32, v: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
 }
 
-/// The mean reflectance of a part of a triangle, and the number of texels along its longest edge.
-fn reflectance_and_texels(scene: &BakeScene, index: usize, side: Side, corners: &Corners) -> (Vec3, f32) {
+/// The mean reflectance of a part of a triangle. If it shows more texels than [`MAX_TEXTURE_POINTS`] allow for, also the
+/// number of texels along its longest edge.
+fn reflectance_and_texels(
+    scene: &BakeScene,
+    index: usize,
+    side: Side,
+    corners: &Corners,
+) -> (Vec3, Option<f32>) {
     let triangle = &scene.triangles[index];
     let surface = &scene.surfaces[triangle.surface as usize];
     let texels = surface.reflectance_texels(triangle.vertices, *corners);
-    let points = if surface.varies() { (texels.ceil() as u32).clamp(2, MAX_TEXTURE_POINTS) } else { 1 };
-    let mean = mean_of_points(points, |(u, v)| {
+    let points = texture_points(texels);
+    let n = if surface.varies() { (points.ceil() as u32).clamp(2, MAX_TEXTURE_POINTS) } else { 1 };
+    let mean = mean_of_points(n, |(u, v)| {
         let (u, v) = point_between(corners, u, v);
         surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
     });
-    (mean, texels)
+    (mean, (points > MAX_TEXTURE_POINTS as f32).then_some(texels.edge))
+}
+
+/// Points along a patch's edge, n for n² points in all, at which its textures are averaged. A few texels are averaged
+/// with a point for each of them along the longest edge, which makes up to four of them per texel. Of many, one point
+/// per texel is enough, and one for every two texels along an edge, since bilinear filtering reads two.
+fn texture_points(texels: ShownTexels) -> f32 {
+    texels.edge.min(FEW_TEXELS).max(texels.area.sqrt()).max(0.5 * texels.edge)
 }
 
 /// The number of the cell at a point. Row `a` holds 2(n - a) - 1 cells, so the rows before it hold a(2n - a).

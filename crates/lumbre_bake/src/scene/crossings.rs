@@ -54,7 +54,7 @@ impl BakeScene {
         let hits = RefCell::new(Vec::new());
         // A traversal in which every hit is rejected continues to the end of the line, so one traversal finds all hits.
         let collect_hit = |triangle: u32, u: f32, v: f32| {
-            if !self.masked || self.is_solid(triangle, u, v) {
+            if self.is_solid(triangle, u, v) {
                 let hit = &self.triangles[triangle as usize];
                 let along = (hit.position(u, v) - origin).dot(direction);
                 let cosine = hit.normal.dot(direction);

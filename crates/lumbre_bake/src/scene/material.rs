@@ -28,6 +28,15 @@ pub(crate) enum Side {
     Back,
 }
 
+/// How many texels of a texture a piece of a triangle shows; 0 without a texture.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ShownTexels {
+    /// Along its longest edge.
+    pub edge: f32,
+    /// Over its area.
+    pub area: f32,
+}
+
 impl SurfaceMaterial {
     /// Whether reflectance, emission or opacity may vary within a triangle.
     pub fn varies(&self) -> bool {
@@ -51,21 +60,24 @@ impl SurfaceMaterial {
     /// Number of texels of the emissive texture along the longest edge of a triangle; 0 without such a texture.
     pub fn emission_texels(&self, vertices: [u32; 3]) -> f32 {
         let texture = self.textures.as_ref().and_then(|textures| textures.emissive.as_ref());
-        texture.map_or(0.0, |texture| self.texels(texture, vertices, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]))
+        let whole = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
+        texture.map_or(0.0, |texture| self.texels(texture, vertices, whole).edge)
     }
 
-    /// Number of texels, along the longest edge of a piece of a triangle, of the finest texture that the reflectance is
-    /// read from; 0 without textures. The piece's corners are given by the weights of the triangle's second and third
-    /// vertex.
-    pub fn reflectance_texels(&self, vertices: [u32; 3], piece: [(f32, f32); 3]) -> f32 {
-        let Some(textures) = &self.textures else { return 0.0 };
+    /// What a piece of a triangle shows of the textures that the reflectance is read from: the most of any of them. The
+    /// piece's corners are given by the weights of the triangle's second and third vertex.
+    pub fn reflectance_texels(&self, vertices: [u32; 3], piece: [(f32, f32); 3]) -> ShownTexels {
+        let Some(textures) = &self.textures else { return ShownTexels::default() };
         let metallic = textures.metallic_roughness.as_ref().map(|metallic| &metallic.texture);
         let read = [textures.base_color.as_ref(), metallic].into_iter().flatten();
-        read.map(|texture| self.texels(texture, vertices, piece)).fold(0.0, f32::max)
+        read.map(|texture| self.texels(texture, vertices, piece)).fold(
+            ShownTexels::default(),
+            |most, texels| ShownTexels { edge: most.edge.max(texels.edge), area: most.area.max(texels.area) },
+        )
     }
 
-    /// Number of texels of a texture along the longest edge of a piece of a triangle.
-    fn texels(&self, texture: &TextureReference, vertices: [u32; 3], piece: [(f32, f32); 3]) -> f32 {
+    /// What a piece of a triangle shows of a texture.
+    fn texels(&self, texture: &TextureReference, vertices: [u32; 3], piece: [(f32, f32); 3]) -> ShownTexels {
         let coordinates = if texture.tex_coord == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
         let size = Vec2::new(texture.image.width as f32, texture.image.height as f32);
         let at = |vertex: u32| {
@@ -73,14 +85,17 @@ impl SurfaceMaterial {
         };
         let [a, b, c] = vertices.map(at);
         let [a, b, c] = piece.map(|(u, v)| a + (b - a) * u + (c - a) * v);
-        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        if longest.is_finite() { longest } else { 0.0 }
+        let edge = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        let area = 0.5 * (b - a).perp_dot(c - a).abs();
+        if edge.is_finite() && area.is_finite() { ShownTexels { edge, area } } else { ShownTexels::default() }
     }
 
     /// Whether light may pass through parts of it.
     pub fn is_masked(&self) -> bool {
         match self.material.alpha_mode {
             AlphaMode::Opaque => false,
+            // A cutoff above 1 hides all of the surface.
+            AlphaMode::Mask { cutoff } if cutoff > 1.0 => true,
             AlphaMode::Mask { .. } | AlphaMode::Blend => self.material.alpha < 1.0 || self.varies(),
         }
     }

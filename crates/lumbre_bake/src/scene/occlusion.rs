@@ -129,7 +129,7 @@ impl BakeScene {
     }
 
     fn closest(&self, ray: &Ray, accept: impl Fn(u32) -> bool) -> Option<Hit> {
-        if self.masked {
+        if self.has_masks() {
             self.bvh.closest_hit_filtered(ray, |index, u, v| accept(index) && self.is_solid(index, u, v))
         } else {
             self.bvh.closest_hit_filtered(ray, |index, _, _| accept(index))
@@ -137,15 +137,28 @@ impl BakeScene {
     }
 
     fn any_hit(&self, ray: &Ray) -> bool {
-        if self.masked {
+        if self.has_masks() {
             self.bvh.any_hit_filtered(ray, |index, u, v| self.is_solid(index, u, v))
         } else {
             self.bvh.any_hit(ray)
         }
     }
 
+    /// Whether some surface lets light through in places.
+    pub fn has_masks(&self) -> bool {
+        !self.masked.is_empty()
+    }
+
+    /// Whether light may pass through parts of a triangle.
+    pub fn is_masked(&self, index: u32) -> bool {
+        self.masked.get(index as usize).is_some_and(|masked| *masked)
+    }
+
     /// Whether a triangle blocks light at a point of it.
     pub(super) fn is_solid(&self, index: u32, u: f32, v: f32) -> bool {
+        if !self.is_masked(index) {
+            return true;
+        }
         let triangle = &self.triangles[index as usize];
         self.surfaces[triangle.surface as usize].stops_light(triangle.vertices, [1.0 - u - v, u, v])
     }

@@ -136,8 +136,9 @@ pub(crate) struct BakeScene {
     pub bvh: Bvh,
     /// Finds the triangles near a place.
     pub boxes: BoxTree,
-    /// Whether some surface lets light through in places.
-    pub masked: bool,
+    /// Per triangle, whether light may pass through parts of it; empty if it passes through none. Every hit of a ray
+    /// reads it.
+    pub masked: Vec<bool>,
     /// Counter of rays that ended where no ray should.
     pub leaks: Leaks,
     /// Set when the bake is cancelled.
@@ -179,7 +180,11 @@ impl BakeScene {
             // Both trees leave out triangles with NaN corners, and keep the indices of the others.
             .map(|t| if t.is_hidden_duplicate { [Vec3::NAN; 3] } else { t.corners })
             .collect();
-        let masked = surfaces.iter().any(SurfaceMaterial::is_masked);
+        let mut masked: Vec<bool> =
+            triangles.iter().map(|triangle| surfaces[triangle.surface as usize].is_masked()).collect();
+        if !masked.contains(&true) {
+            masked = Vec::new();
+        }
         let closed_scene = all_within(&rooms, triangles.iter().map(|triangle| triangle.corners));
         let leaks = Leaks::new(closed_scene);
         Ok(Self {

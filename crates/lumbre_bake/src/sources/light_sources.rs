@@ -84,7 +84,7 @@ pub(crate) fn shines_inside_only(
     let is_light_inside = |placed: &PlacedLight| {
         placed.light.kind != LightKind::Directional && inside(&[scene.space.position(placed.position)])
     };
-    !scene.masked
+    !scene.has_masks()
         && sky == Vec3::ZERO
         && lights.iter().all(is_light_inside)
         && emitters.iter().all(|emitter| inside(&emitter.corners))

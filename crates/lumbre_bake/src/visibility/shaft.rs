@@ -250,8 +250,7 @@ impl Shaft {
             }
             tested <= MAX_TESTED && found.len() <= most
         });
-        let is_opaque =
-            |&index: &u32| !scene.surfaces[scene.triangles[index as usize].surface as usize].is_masked();
+        let is_opaque = |index: &u32| !scene.is_masked(*index);
         (is_complete && found.iter().all(is_opaque)).then_some(found)
     }
 }
