@@ -9,6 +9,7 @@ use lumbre_scene::{IrradianceVolume, Transform};
 
 use crate::apply::apply;
 use crate::checkpoint::CheckpointFile;
+use crate::chunks::decide;
 use crate::content_hash::hashes_of;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::direct_light::direct_light;
@@ -252,7 +253,8 @@ fn run(
 
     monitor.stage(Stage::DirectLight, report)?;
     let texels = CoveredTexels::new(&scene, &layout, monitor, report)?;
-    let patch_options = options.for_patches(monitor.clock().is_past(SHORT_OF_TIME));
+    let is_time_short = monitor.clock().is_past(SHORT_OF_TIME);
+    let patch_options = options.for_patches(decide(monitor, is_time_short)?);
     let resolution = monitor.run_interruptible(1.0, || {
         memory::resolution(&scene, &texels, sample_bytes, &patch_options, report)
     })??;

@@ -41,6 +41,17 @@ pub(crate) fn in_chunks_until_deadline<T: Send + Record>(
     compute_chunks(count, monitor, true, compute)
 }
 
+/// A decision that depends on the clock. The checkpoint keeps it, so that a resumed bake decides the same.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn decide<T: Copy + Send + Sync + Record>(
+    monitor: &mut BakeMonitor<'_>,
+    decision: T,
+) -> Result<T, BakeError> {
+    Ok(in_chunks(1, monitor, |_| decision)?.first().copied().unwrap_or(decision))
+}
+
 /// As [`in_chunks`], but without the checkpoint: for lists that are quick to compute again.
 ///
 /// # Errors

@@ -111,15 +111,14 @@ impl Clock {
     /// The total number of samples, at most `wanted`, for which there is time, given that the `taken` ones so far took
     /// `seconds`. Without a time limit, all of them.
     pub fn affordable(&self, taken: u32, wanted: u32, seconds: f64) -> u32 {
-        let Some(limit) = self.limit else { return wanted };
-        let left = (limit.as_secs_f64() - self.seconds()).max(0.0);
+        let Some(left) = self.seconds_left() else { return wanted };
         let more = f64::from(taken) * left / seconds.max(1e-6);
         wanted.min(taken.saturating_add(more as u32))
     }
 
-    /// Returns true if so many seconds are left; always true without a limit.
-    pub fn has_left(&self, seconds: f64) -> bool {
-        self.limit.is_none_or(|limit| self.seconds() + seconds <= limit.as_secs_f64())
+    /// Seconds until the time is up, at least 0; `None` without a limit.
+    pub fn seconds_left(&self) -> Option<f64> {
+        self.limit.map(|limit| (limit.as_secs_f64() - self.seconds()).max(0.0))
     }
 
     /// Returns true if `share` of the time limit has passed; never true without a limit.

@@ -236,9 +236,13 @@ const SMALL_BUDGET: u64 = 32_000_000;
 
 impl BakeOptions {
     /// The quality's effort, reduced if a large error was requested: the rays that are cast before the error can be
-    /// estimated should not cost more than that error needs.
+    /// estimated should not cost more than that error needs. If time is limited, it ends a final bake instead of the
+    /// quality's limit of rays.
     pub(crate) fn effort(&self) -> Effort {
         let mut effort = self.quality.effort();
+        if self.time.is_some() && self.quality == Quality::Final {
+            effort.mean = Quality::Reference.effort().mean;
+        }
         effort.patch_texels = self.patch_texels.unwrap_or(effort.patch_texels);
         if self.quality == Quality::Reference {
             return effort;

@@ -10,9 +10,11 @@ pub(crate) mod local_light;
 pub(crate) mod shafts;
 pub(crate) mod shared_light;
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use glam::Vec3;
 
-use crate::chunks::{in_chunks, in_chunks_until_deadline};
+use crate::chunks::{decide, in_chunks, in_chunks_until_deadline};
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Texel, open_texels, receiver};
 use crate::denoise::neighbourhoods::Neighbourhoods;
@@ -64,8 +66,9 @@ pub(crate) fn direct_light(
     monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<DirectLight, BakeError> {
-    let sampler = SourceSampler::new(sources, texels, known, options, monitor)?;
+    let mut sampler = SourceSampler::new(sources, texels, known, options, monitor)?;
     let mut direct = sampler.first_pass(monitor)?;
+    sampler.share_penumbrae(&mut direct, monitor)?;
     let mut shared = sampler.shared_light(monitor)?;
     let so_far = shared.as_ref().map(|shared| shared.with(&direct));
     monitor.pass(PASS_OF_LOCAL_LIGHT);
@@ -129,8 +132,9 @@ impl<'a> SourceSampler<'a> {
         let shafts =
             monitor.run_interruptible(1.0, || Shafts::new(sources.scene, sources, list, &cuts, is_wanted))?;
         // Where shadow rays would be needed anyway, one ray to any of the sources is worth as much as one to each of
-        // them.
-        cuts.share(sources, &shafts.unresolved(&cuts));
+        // them. Not so where all lamps have samples of their own: the unoccluded sum over them is exact, and rays only
+        // find the visible share of it.
+        cuts.share(sources, &shafts.unresolved(&cuts, |_, cut| !cut.has_all_lamps));
         Ok(Self { sources, texels, known, options, cuts, shafts })
     }
 
@@ -160,15 +164,24 @@ impl<'a> SourceSampler<'a> {
         )
     }
 
-    /// Known light, and a few samples of every other texel: a complete map, whatever time it takes.
-    fn first_pass(&self, monitor: &mut BakeMonitor<'_>) -> Result<Vec<Direct>, BakeError> {
+    /// The light of texels by a few samples, whatever time it takes.
+    fn few_samples(
+        &self,
+        texels: &[CoveredTexel],
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<Vec<Direct>, BakeError> {
         let [few, ..] = self.options.effort().direct;
         let clock = monitor.clock();
         monitor.pass(PASS);
+        in_chunks(texels.len(), monitor, |place| {
+            self.light(texels[place], if clock.is_over() { few.min(LATE_SAMPLES) } else { few })
+        })
+    }
+
+    /// Known light, and a few samples of every other texel: a complete map, whatever time it takes.
+    fn first_pass(&self, monitor: &mut BakeMonitor<'_>) -> Result<Vec<Direct>, BakeError> {
         let unknown: Vec<CoveredTexel> = self.unknown().collect();
-        let sampled = in_chunks(unknown.len(), monitor, |place| {
-            self.light(unknown[place], if clock.is_over() { few.min(LATE_SAMPLES) } else { few })
-        })?;
+        let sampled = self.few_samples(&unknown, monitor)?;
         let mut direct: Vec<Direct> = CoveredTexel::all(self.texels.list.len())
             .map(|texel| known_light(self.known, texel).unwrap_or_default())
             .collect();
@@ -176,6 +189,36 @@ impl<'a> SourceSampler<'a> {
             direct[texel.place()] = light;
         }
         Ok(direct)
+    }
+
+    /// Makes lamps share samples in blocks that lie in their penumbrae for the most part: behind a grille, or among
+    /// many thin blockers. The visible share of each texel by itself would take hundreds of rays, while smoothing makes
+    /// use of the neighbours' samples. The light of these blocks is sampled again.
+    fn share_penumbrae(
+        &mut self,
+        direct: &mut [Direct],
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<(), BakeError> {
+        // Per block, its texels outside of penumbrae less those in them.
+        let mut balance: BTreeMap<u32, i64> = BTreeMap::new();
+        for texel in self.unknown().filter(|texel| !self.texels.list[texel.place()].is_hidden()) {
+            let partly = direct[texel.place()].seen.partly;
+            *balance.entry(self.cuts.block(texel.place())).or_default() += if partly { -1 } else { 1 };
+        }
+        let is_penumbra = |block: u32| balance.get(&block).is_some_and(|balance| *balance < 0);
+        let lamps = self.shafts.unresolved(&self.cuts, |block, cut| cut.has_all_lamps && is_penumbra(block));
+        if lamps.is_empty() {
+            return Ok(());
+        }
+        self.cuts.share(self.sources, &lamps);
+        let blocks: BTreeSet<u32> = lamps.iter().map(|(texel, _)| self.cuts.block(*texel as usize)).collect();
+        let changed: Vec<CoveredTexel> =
+            self.unknown().filter(|texel| blocks.contains(&self.cuts.block(texel.place()))).collect();
+        for (texel, light) in changed.iter().zip(self.few_samples(&changed, monitor)?) {
+            let rays = direct[texel.place()].rays + light.rays;
+            direct[texel.place()] = Direct { rays, ..light };
+        }
+        Ok(())
     }
 
     /// The first round of the sources that share samples; `None` if there are none.
@@ -288,11 +331,10 @@ fn error_goals(options: &BakeOptions) -> Vec<f64> {
 /// Under a time limit the first error to aim at is at least this one, and less than twice as large.
 const MIN_FIRST_GOAL: f64 = 0.08;
 
-/// Whether there is too little time to aim at half the error of the last goal, which took so many seconds. The answer is
-/// kept in the checkpoint, as it depends on the clock.
+/// Whether there is too little time to aim at half the error of the last goal, which took so many seconds.
 fn is_late_for_finer_goal(seconds: f64, monitor: &mut BakeMonitor<'_>) -> Result<bool, BakeError> {
-    let is_late = !monitor.clock().has_left(TIME_OF_NEXT_GOAL * seconds);
-    Ok(in_chunks(1, monitor, |_| is_late)?.contains(&true))
+    let is_late = monitor.clock().seconds_left().is_some_and(|left| left < TIME_OF_NEXT_GOAL * seconds);
+    decide(monitor, is_late)
 }
 
 /// How many times as long as a goal the next one takes, which allows half its error: a quarter of the squared error takes

@@ -119,9 +119,14 @@ impl<'a> Shafts<'a> {
         Some(TileOccluders { lamps, lights, open_texel: None })
     }
 
-    /// Lamps that have samples of their own in a block, but whose occluders are unknown in most of the block's tiles:
-    /// pairs of a texel's index, which stands for its block, and the lamp.
-    pub fn unresolved(&self, cuts: &LightCuts) -> Vec<(u32, u32)> {
+    /// Lamps that have samples of their own in a block that `is_searched` accepts, by its number and cut, but whose
+    /// occluders are unknown in most of the block's tiles: pairs of a texel's index, which stands for its block, and
+    /// the lamp.
+    pub fn unresolved(
+        &self,
+        cuts: &LightCuts,
+        is_searched: impl Fn(u32, &LightCut) -> bool,
+    ) -> Vec<(u32, u32)> {
         // The number of tiles in each block; and for each block and lamp a texel and the number of tiles that do not
         // know the lamp's occluders.
         let mut tiles: BTreeMap<u32, u32> = BTreeMap::new();
@@ -129,10 +134,8 @@ impl<'a> Shafts<'a> {
         for (tile, texel) in self.tiles.iter().filter_map(|tile| Some((tile, tile.open_texel?))) {
             let block = cuts.block(texel as usize);
             *tiles.entry(block).or_default() += 1;
-            // Where all lamps have samples of their own, the unoccluded sum over them is exact and rays only find the
-            // visible share of it.
             let cut = cuts.of(texel as usize);
-            for &lamp in cut.lamps.iter().filter(|_| !cut.has_all_lamps) {
+            for &lamp in cut.lamps.iter().filter(|_| is_searched(block, cut)) {
                 if tile.lamps.iter().all(|occluders| occluders.node != lamp) {
                     unresolved.entry((block, lamp)).or_insert((texel, 0)).1 += 1;
                 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
-use crate::chunks::{in_chunks, in_chunks_until_deadline};
+use crate::chunks::{decide, in_chunks, in_chunks_until_deadline};
 use crate::coverage::footprint::{Texel, receiver};
 use crate::coverage::tile_sequence::TileSequence;
 use crate::denoise::neighbourhoods::Neighbourhoods;
@@ -143,6 +143,7 @@ impl<'a> SharedLight<'a> {
             sums
         })?;
         let samples = monitor.clock().affordable(few, first, monitor.seconds() - begun);
+        let samples = decide(monitor, samples)?;
         if samples > few {
             let more = in_chunks_until_deadline(texels.len(), monitor, |place| {
                 let mut sums = light.sums[place];

@@ -12,7 +12,7 @@ use super::map_error::MapError;
 use super::patch_fallback::from_patches;
 use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
-use crate::chunks::in_chunks_until_deadline;
+use crate::chunks::{decide, in_chunks_until_deadline};
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::Texel;
 use crate::denoise::neighbourhoods::Neighbourhoods;
@@ -20,7 +20,7 @@ use crate::denoise::replicates::{Estimates, REPLICATES, mean, spread};
 use crate::denoise::smooth::smooth;
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
-use crate::monitor::BakeMonitor;
+use crate::monitor::{BakeMonitor, Clock};
 use crate::sample_allocation::{SampleAllocation, allocate_within};
 use crate::sources::direct::Direct;
 use crate::squared_errors::SquaredErrors;
@@ -108,14 +108,20 @@ pub(crate) fn gather(
     // The previous bake decided that more rays were not needed. If all of it is reused, that still holds.
     let is_all_reused = reused.is_some() && wanted.is_empty();
     monitor.pass(ROUND_PROGRESS);
+    let mut speed = CastSpeed::default();
+    let begun = monitor.seconds();
     let mut in_time = cast_first_round(cache, list, wanted, &mut gathered, options, monitor)?;
+    speed.add(monitor.seconds() - begun, &gathered);
     let mut plan: Option<RoundPlan> = None;
     let mut stalled_rounds = 0;
     let mut reads = TexelReads::new(cache.patches.mean_reflectance(), &gathered);
     let result = loop {
+        let begun = monitor.seconds();
         let result = planner.evaluate(&gathered, &reads, monitor, report)?;
-        let is_late = !in_time || monitor.clock().is_over();
-        let next = planner.plan(&gathered, &result);
+        // A round needs time for its rays, and for another evaluation.
+        let affordable = speed.affordable_samples(monitor.seconds() - begun, monitor.clock());
+        let next = planner.plan(&gathered, &result, decide(monitor, affordable)?);
+        let is_late = !in_time || monitor.clock().is_over() || next.is_late;
         let is_hardly_reducible = next.reducible_error <= MIN_REDUCIBLE * result.relative_squares;
         let has_stalled = plan.as_ref().is_some_and(|plan| plan.has_stalled(next.reducible_error));
         stalled_rounds = if has_stalled { stalled_rounds + 1 } else { 0 };
@@ -131,7 +137,9 @@ pub(crate) fn gather(
         monitor.pass(ROUND_PROGRESS);
         let rest = planner.open.iter().map(|texel| reads.rest_in(&gathered[texel.place()])).sum::<f64>();
         reads.add(next.samples(&gathered), rest / planner.count());
+        let begun = monitor.seconds();
         in_time = cast(cache, list, &next.wanted, &mut gathered, options, monitor)?;
+        speed.add(monitor.seconds() - begun, &gathered);
         plan = Some(next);
     };
     let RoundResult { light, variances, .. } = result;
@@ -145,6 +153,28 @@ pub(crate) fn gather(
     let cast: u64 = cast.map(|sums| u64::from(sums.samples) * REPLICATES as u64).sum();
     report.gather_rays = cast as f64 / planner.open.len().max(1) as f64;
     Ok(IndirectLight { light, variances, gathered })
+}
+
+/// How quickly samples are cast.
+#[derive(Default)]
+struct CastSpeed {
+    /// Samples per replicate, of all texels together.
+    samples: u64,
+    seconds: f64,
+}
+
+impl CastSpeed {
+    /// Adds the seconds of a round, after which so much is `gathered`.
+    fn add(&mut self, seconds: f64, gathered: &[GatherSums]) {
+        self.seconds += seconds;
+        self.samples = gathered.iter().map(|sums| u64::from(sums.samples)).sum();
+    }
+
+    /// For how many samples there is time if `reserved` seconds must be left afterwards.
+    fn affordable_samples(&self, reserved: f64, clock: Clock) -> u64 {
+        let Some(left) = clock.seconds_left() else { return u64::MAX };
+        (self.samples as f64 * (left - reserved).max(0.0) / self.seconds.max(1e-6)) as u64
+    }
 }
 
 /// Estimates light and errors after each round, and decides where the next one casts its rays.
@@ -183,6 +213,8 @@ struct RoundPlan {
     is_last: bool,
     /// The quality's rays are spent, but the requested error is only a small step away.
     is_small_step: bool,
+    /// The time left allows too few rays.
+    is_late: bool,
 }
 
 impl RoundPlan {
@@ -283,8 +315,8 @@ impl<'a> RoundPlanner<'a> {
     }
 
     /// Allocates the rays of the next round such that they reduce the reducible part of the error to what is needed to
-    /// reach the requested one.
-    fn plan(&self, gathered: &[GatherSums], result: &RoundResult) -> RoundPlan {
+    /// reach the requested one. There is time for so many `affordable` samples per replicate.
+    fn plan(&self, gathered: &[GatherSums], result: &RoundResult, affordable: u64) -> RoundPlan {
         let [_, max_samples] = self.options.effort().gather.map(|samples| samples / REPLICATES as u32);
         // From the second round on, rays read the light of texels instead of patches, and so also reduce the error that
         // was read from patches. The bias that is measured by checks against real bounces is not counted as reducible.
@@ -301,6 +333,7 @@ impl<'a> RoundPlanner<'a> {
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let requested_over_left = requested / result.relative_squares.max(f64::MIN_POSITIVE);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP;
+        let is_late = (affordable as f64) < MIN_ROUND * cast as f64;
         let (target, budget) = match is_small_step {
             true => {
                 let raised_limit = (limit as f64 * SMALL_STEP_RAYS) as u64;
@@ -317,11 +350,13 @@ impl<'a> RoundPlanner<'a> {
         let goal = goal * open_sum(self.texels, &by_rays.cautious) / reducible_error.max(f64::MIN_POSITIVE);
         let open = self.open.iter().copied();
         let errors = &by_rays.cautious;
+        let budget = budget.min(affordable);
         let wanted = allocate_within(budget, open, errors, &samples, max_samples, CONVERGENCE_ORDER, goal);
         RoundPlan {
             reducible_error,
             is_last: (is_spent && !is_small_step) || wanted.is_empty(),
             is_small_step,
+            is_late,
             wanted,
         }
     }
@@ -392,10 +427,10 @@ fn limit_to_time(
         wanted.retain(|allocated| gathered[allocated.texel.place()].samples == 0);
         return Ok(wanted);
     }
-    let (clock, seconds) = (monitor.clock(), monitor.seconds() - begun);
-    wanted.iter_mut().for_each(|allocated| {
-        allocated.samples = clock.affordable(1, allocated.samples, seconds);
-    });
+    let most = wanted.iter().map(|allocated| allocated.samples).max().unwrap_or(1);
+    let affordable = monitor.clock().affordable(1, most, monitor.seconds() - begun);
+    let affordable = decide(monitor, affordable)?;
+    wanted.iter_mut().for_each(|allocated| allocated.samples = allocated.samples.min(affordable));
     wanted.retain(|allocated| allocated.samples > 1);
     Ok(wanted)
 }

@@ -16,7 +16,7 @@ use crate::sources::light_sources::Sources;
 pub(crate) struct LightCut {
     /// Nodes of the emitter tree that are sampled individually: lamps, or groups of them.
     pub lamps: Vec<u32>,
-    /// Whether `lamps` covers all lamps of the scene.
+    /// Whether `lamps` covers all lamps of the scene, so that none shares samples.
     pub has_all_lamps: bool,
     /// Indices of the punctual lights that are sampled individually, ascending.
     pub lights: Vec<u32>,
@@ -156,8 +156,15 @@ impl Sources<'_> {
     pub fn cut(&self, receiver: &Receiver, reach: f32, shared: &[u32]) -> LightCut {
         let mut cut = LightCut { lights: self.individually_sampled_lights.clone(), ..LightCut::default() };
         let mut roots = Vec::new();
-        match self.few_lamps(receiver) {
-            Some(lamps) => (cut.lamps, cut.has_all_lamps) = (lamps, true),
+        let few_lamps = self.few_lamps(receiver);
+        let are_lamps_few = few_lamps.is_some();
+        match few_lamps {
+            Some(lamps) => {
+                let (sharing, individual): (Vec<u32>, _) =
+                    lamps.into_iter().partition(|lamp| shared.contains(lamp));
+                (cut.lamps, cut.has_all_lamps) = (individual, sharing.is_empty());
+                roots.extend(sharing.into_iter().map(Branch::Emitters));
+            }
             None => roots.extend(self.emitter_tree.root().map(Branch::Emitters)),
         }
         roots.extend(self.light_tree.root().map(Branch::Lights));
@@ -183,10 +190,14 @@ impl Sources<'_> {
         closed.sort_unstable_by(|a, b| b.cmp(a));
         let mut individual = 0;
         closed.retain(|node| {
-            let is_individual = individual < MAX_INDIVIDUAL
+            let may_be_individual = match node.branch {
+                Branch::Emitters(lamp) => !are_lamps_few && !shared.contains(&lamp),
+                Branch::Lights(_) => true,
+            };
+            let is_individual = may_be_individual
+                && individual < MAX_INDIVIDUAL
                 && node.weight >= INDIVIDUAL_SHARE * total
-                && self.is_single(node.branch)
-                && !matches!(node.branch, Branch::Emitters(lamp) if shared.contains(&lamp));
+                && self.is_single(node.branch);
             if is_individual {
                 individual += 1;
                 match node.branch {
