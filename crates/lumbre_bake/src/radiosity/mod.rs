@@ -25,3 +25,4 @@ pub(crate) mod size_error;
 pub(crate) mod solution;
 pub(crate) mod solver;
 pub(crate) mod stationary;
+mod unseen_regions;

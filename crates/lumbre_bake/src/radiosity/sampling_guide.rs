@@ -2,8 +2,8 @@
 //! the final gather sends a share of its samples there (Ureña and Torres, "Improved Irradiance Computation by
 //! Importance Sampling", 1997). A sample chooses a region of several patches first, since with few rays a single
 //! patch's form factors are noisy, and often 0 for a patch that does give light; then one of the region's patches by
-//! how much light leaves each, so that a beam of sunlight in a dark region is found. The samples are taken in
-//! `final_gather`.
+//! how much light leaves each, so that a beam of sunlight in a dark region is found. Bright regions that the rays of the
+//! form factors have missed are added by `unseen_regions`. The samples are taken in `final_gather`.
 
 use glam::Vec3;
 
@@ -11,6 +11,7 @@ use super::form_factors::FormFactors;
 use super::larger_patches::LargerPatches;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
+use super::unseen_regions::UnseenRegions;
 use crate::scene::BakeScene;
 
 /// A region of the guide, by its place among all regions.
@@ -92,9 +93,10 @@ impl SamplingGuide {
                 members.iter().map(power).sum::<f64>() / total
             })
             .collect();
+        let unseen = UnseenRegions::new(scene, &larger, REGION_SIDE * side, &radiosity_of_regions);
         let share_and_row = |members: &[PatchIndex], exchange: Vec<(PatchIndex, f64)>| {
-            let flux: Vec<(u32, f64)> = exchange
-                .into_iter()
+            let mut flux: Vec<(u32, f64)> = exchange
+                .iter()
                 .map(|(region, g)| (region.0, g * radiosity_of_regions[region.place()]))
                 .collect();
             let by_bounces: f64 = flux.iter().map(|(_, flux)| flux).sum();
@@ -108,6 +110,9 @@ impl SamplingGuide {
             } else {
                 0.0
             };
+            if let Some(first) = members.first() {
+                unseen.add(larger.of[first.place()], &exchange, &mut flux);
+            }
             (share, if share > 0.0 { cumulative(flux) } else { Vec::new() })
         };
         let distributions = larger.rows(factors, share_and_row);

@@ -1,0 +1,113 @@
+//! A guess at the light of bright regions that the rays of the form factors have missed, for the sampling guide. A small
+//! and bright region, such as the inside of a lamp's shaft behind a grille, may be hit by none of the few thousand rays
+//! of another region, though much of the light there comes from it. The guide would never choose it, and each cosine
+//! ray that finds it would be a firefly. What is known better is how much is exchanged with everything around the
+//! region, as that is hit by more rays.
+
+use std::collections::BTreeMap;
+
+use glam::{IVec3, Vec3};
+
+use super::larger_patches::LargerPatches;
+use super::patch_index::PatchIndex;
+use crate::scene::BakeScene;
+
+/// Side of the cubes within which exchange is shared out, in sides of a region.
+const CUBE_SIDE: f32 = 2.0;
+/// Most regions of a cube that are guessed at: those that the most light leaves.
+const MAX_BRIGHT: usize = 32;
+/// The guess as a share of the light that it would bring if all of a cube were seen equally well.
+const GUESS: f64 = 0.25;
+/// Most of the guess, as a share of the known light.
+const MAX_GUESS: f64 = 0.3;
+/// Guesses below this share of the known light are left out, so that rows stay short.
+const MIN_GUESS: f64 = 1e-3;
+
+/// Where each region is, and which regions of each cube give off the most light.
+pub(crate) struct UnseenRegions {
+    /// Centroid and normal of each region.
+    places: Vec<(Vec3, Vec3)>,
+    /// The cube of each region.
+    cube_of: Vec<u32>,
+    cubes: Vec<Cube>,
+}
+
+/// The regions within a cube.
+#[derive(Clone, Debug, Default)]
+struct Cube {
+    /// Square canonical units.
+    area: f64,
+    /// Its brightest regions, each with the power that leaves it.
+    bright: Vec<(PatchIndex, f64)>,
+}
+
+impl UnseenRegions {
+    /// From regions of about `side` canonical units, and the radiosity of each.
+    pub fn new(scene: &BakeScene, regions: &LargerPatches, side: f32, radiosity: &[f64]) -> Self {
+        let mut numbers: BTreeMap<[i32; 3], u32> = BTreeMap::new();
+        let mut unseen = Self { places: Vec::new(), cube_of: Vec::new(), cubes: Vec::new() };
+        for (region, radiosity) in PatchIndex::all(radiosity.len()).zip(radiosity) {
+            let patch = &regions.patches.list[region.place()];
+            let centroid = regions.patches.corners(scene, patch).iter().sum::<Vec3>() / 3.0;
+            let normal = scene.triangles[patch.triangle as usize].side_normal(patch.side);
+            let cell: IVec3 = (centroid / (CUBE_SIDE * side)).floor().as_ivec3();
+            let next = unseen.cubes.len() as u32;
+            let number = *numbers.entry(cell.to_array()).or_insert(next);
+            if number == next {
+                unseen.cubes.push(Cube::default());
+            }
+            let cube = &mut unseen.cubes[number as usize];
+            cube.area += f64::from(patch.area);
+            cube.bright.push((region, radiosity * f64::from(patch.area)));
+            unseen.places.push((centroid, normal));
+            unseen.cube_of.push(number);
+        }
+        for cube in &mut unseen.cubes {
+            cube.bright.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+            cube.bright.truncate(MAX_BRIGHT);
+        }
+        unseen
+    }
+
+    /// Adds guesses to the light that `receiver` gets from other regions: `flux`, by the number of the region,
+    /// ascending, according to the exchange areas of the same regions.
+    pub fn add(&self, receiver: PatchIndex, exchange: &[(PatchIndex, f64)], flux: &mut Vec<(u32, f64)>) {
+        let known: f64 = flux.iter().map(|(_, flux)| flux).sum();
+        let mut by_cube: BTreeMap<u32, f64> = BTreeMap::new();
+        for (region, g) in exchange {
+            *by_cube.entry(self.cube_of[region.place()]).or_default() += g;
+        }
+        let mut guesses: Vec<(u32, f64)> = Vec::new();
+        for (number, g) in by_cube {
+            let cube = &self.cubes[number as usize];
+            for &(region, power) in &cube.bright {
+                let guess = GUESS * g * power / cube.area;
+                if guess.is_nan() || guess < MIN_GUESS * known {
+                    break;
+                }
+                if self.face_each_other(receiver, region) {
+                    guesses.push((region.0, guess));
+                }
+            }
+        }
+        let total: f64 = guesses.iter().map(|(_, guess)| guess).sum();
+        let scale = (MAX_GUESS * known / total).min(1.0);
+        flux.extend(guesses.into_iter().map(|(region, guess)| (region, guess * scale)));
+        flux.sort_by_key(|(region, _)| *region);
+        flux.dedup_by(|later, first| {
+            let is_same = later.0 == first.0;
+            if is_same {
+                first.1 += later.1;
+            }
+            is_same
+        });
+    }
+
+    /// Whether the middles of two regions lie in front of each other.
+    fn face_each_other(&self, receiver: PatchIndex, other: PatchIndex) -> bool {
+        let ((from, normal), (to, other_normal)) =
+            (self.places[receiver.place()], self.places[other.place()]);
+        let along = to - from;
+        along.dot(normal) > 0.0 && along.dot(other_normal) < 0.0
+    }
+}
