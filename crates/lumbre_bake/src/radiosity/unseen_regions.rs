@@ -15,13 +15,13 @@ use crate::scene::BakeScene;
 /// Side of the cubes within which exchange is shared out, in sides of a region.
 const CUBE_SIDE: f32 = 2.0;
 /// Most regions of a cube that are guessed at: those that the most light leaves.
-const MAX_BRIGHT: usize = 32;
+const MAX_BRIGHT: usize = 64;
 /// The guess as a share of the light that it would bring if all of a cube were seen equally well.
-const GUESS: f64 = 0.25;
+const GUESS: f64 = 1.0;
 /// Most of the guess, as a share of the known light.
-const MAX_GUESS: f64 = 0.3;
+const MAX_GUESS: f64 = 0.8;
 /// Guesses below this share of the known light are left out, so that rows stay short.
-const MIN_GUESS: f64 = 1e-3;
+const MIN_GUESS: f64 = 3e-4;
 
 /// Where each region is, and which regions of each cube give off the most light.
 pub(crate) struct UnseenRegions {
