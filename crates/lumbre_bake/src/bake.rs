@@ -41,8 +41,7 @@ use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, 
 /// If the bake fails or is cancelled, the World's meshes and lightmaps are unchanged; only global transforms have been
 /// updated.
 ///
-/// The same World and options give the same bits on any number of threads, unless [`BakeOptions::time`] cuts the bake
-/// short.
+/// The same World and options give the same bits on any number of threads, unless [`BakeOptions::time`] limits the bake.
 ///
 /// ```
 /// # use bevy_ecs::world::World;

@@ -66,12 +66,13 @@ const FORM_FACTOR_RAY_BYTES: u64 = 2 * 8 + 8 + 2 * 8 + 2 * 8 + 8;
 
 /// Per patch, for the sampling guide: the number of its region, its place in the region's list, its exitance, its
 /// probability and its density in the region, and at worst a region of its own, with its cut, the heads of its lists
-/// and row, its brightness and its exchange.
-const GUIDED_PATCH_BYTES: u64 = (4 + 8 + 4 + 8 + 8 + size_of::<Patch>() + 16 + 28 + 16 + 8 + 8) as u64;
+/// and row, its brightness, its exchange, its place and its cube.
+const GUIDED_PATCH_BYTES: u64 =
+    (4 + 8 + 4 + 8 + 8 + size_of::<Patch>() + 16 + 28 + 16 + 8 + 8 + 28 + 2 * 16) as u64;
 
-/// Per form factor ray, for the sampling guide: two pairs of regions, each an index and a probability, in lists that
-/// may have grown to twice their length.
-const GUIDE_PAIR_BYTES: u64 = 2 * 2 * (4 + 4);
+/// Per form factor ray, for the sampling guide: two pairs of regions and as many guesses, each an index and a
+/// probability, in lists that may have grown to twice their length.
+const GUIDE_PAIR_BYTES: u64 = 2 * 2 * 2 * (4 + 4);
 
 /// Per covered texel, for the samples that the bake returns.
 pub(crate) const SAMPLES_BYTES: u64 = size_of::<TexelSamples>() as u64;

@@ -77,8 +77,8 @@ pub struct BakeOptions {
     /// How densely surfaces are covered with texels.
     pub density: Density,
     /// The target: the relative RMSE that sampling may leave in the lightmap; positive. 0.01 is one per cent of the
-    /// light around each texel. The final gather stops when its estimate reaches this, or at the quality's limit of
-    /// rays.
+    /// light around each texel. The final gather stops when its estimate reaches this, when the time is up, or, except
+    /// in a final bake with a time limit, at the quality's limit of rays.
     pub error: f64,
     /// Wall-clock time after which no more samples are taken; `None` for no limit. The map is complete all the same,
     /// only noisier. Its bits then depend on the machine's speed.
@@ -168,7 +168,7 @@ pub(crate) struct Effort {
     pub shared: [u32; 2],
     /// Gather rays per texel: in the first round, and at most.
     pub gather: [u32; 2],
-    /// Limit for a bake's total, whatever error was requested: most gather rays, and most samples of the sources that
+    /// Limit for a bake's total, whatever error was requested (not of a final bake whose time is limited): most gather rays, and most samples of the sources that
     /// share them, per texel on average. The total may always be as large as [`SMALL_BUDGET`].
     pub mean: u32,
 }

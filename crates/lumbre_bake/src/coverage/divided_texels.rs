@@ -18,7 +18,7 @@ const MIN_LENGTH: f64 = 0.25;
 /// Distance from a line, in texels, up to which a point counts as on the line and not beyond it.
 const MARGIN: f64 = 0.05;
 
-/// The contact lines on everything that the maps show, except on triangles for which [`has_area_for_lines`] is false.
+/// The contact lines on everything that the maps show, except on triangles for which [`has_contact_lines`] is false.
 pub(crate) fn contact_lines(scene: &BakeScene, layout: &LightmapLayout) -> ContactLines {
     let mut lines: Vec<(MapTexel, [DVec2; 2])> = (0..scene.triangles.len())
         .into_par_iter()
@@ -52,11 +52,12 @@ pub(crate) fn divided_texels(
     divided
 }
 
-/// Whether contact lines on a triangle are searched for: it is at least as large as a texel.
-pub(crate) fn has_area_for_lines(triangle: &SceneTriangle) -> bool {
+/// Whether contact lines on a triangle are searched for: it is at least as large as a texel, and no coincident triangle
+/// replaces it. Even then some are missing: short ones, and those of surfaces that cross it at a small angle.
+pub(crate) fn has_contact_lines(triangle: &SceneTriangle) -> bool {
     let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
     let doubled_area = (b - a).perp_dot(c - a).abs();
-    doubled_area.is_finite() && doubled_area > 2.0
+    !triangle.is_hidden_duplicate && doubled_area.is_finite() && doubled_area > 2.0
 }
 
 /// The texels that contact lines on a triangle cross, each with the segment of the line in the texel's unit square.
@@ -67,7 +68,7 @@ fn texels_crossed_on(
 ) -> Vec<(MapTexel, [DVec2; 2])> {
     let triangle = &scene.triangles[index];
     let map = &layout.maps[triangle.object as usize];
-    if triangle.is_hidden_duplicate || scene.stop.is_cancelled() || !has_area_for_lines(triangle) {
+    if scene.stop.is_cancelled() || !has_contact_lines(triangle) {
         return Vec::new();
     }
     let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::contact_lines::ContactLines;
-use super::divided_texels::has_area_for_lines;
+use super::divided_texels::has_contact_lines;
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
 use super::texel_geometry::{bounding_area, positions_of};
 use super::texel_groups::TexelGroups;
@@ -110,39 +110,50 @@ fn suspicious_texels(
     let mut is_crossed = vec![false; layout.texels];
     contacts.iter().for_each(|(texel, _)| is_crossed[texel.place()] = true);
     let suspicious_tiles = monitor.run_interruptible(0.0, || {
-        let is_suspicious = |members: &Vec<u32>| {
+        let check = |members: &Vec<u32>| {
             let members: Vec<&Texel> = members.iter().map(|&place| &texels[place as usize]).collect();
-            is_suspicious_tile(scene, &members, &is_crossed)
+            suspicious_tile(scene, &members, &is_crossed)
         };
-        tiles.members.par_iter().map(is_suspicious).collect::<Vec<bool>>()
+        tiles.members.par_iter().map(check).collect::<Vec<(bool, u32)>>()
     })?;
-    let must_probe = |place: usize| suspicious_tiles[tiles.group_of[place] as usize];
+    let must_probe = |place: usize| suspicious_tiles[tiles.group_of[place] as usize].0;
     monitor.pass(PASSES[0]);
     let suspicious = in_chunks(texels.len(), monitor, |place| {
         let probes = if place >= ALWAYS_EXACT && clock.is_over() { LATE_PROBES } else { PROBES };
         must_probe(place) && is_suspicious(scene, &texels[place], probes)
     })?;
     let probed = (0..texels.len()).filter(|&place| must_probe(place)).count();
-    let rays = tiles.members.len() as u64 * u64::from(TILE_PROBES) + probed as u64 * u64::from(PROBES);
-    Ok((suspicious, rays))
+    let rays = suspicious_tiles.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
+    Ok((suspicious, rays + probed as u64 * u64::from(PROBES)))
 }
 
-/// Whether the texels of a tile have to be probed one by one: unless it is all hidden or all open, and a few rays for
-/// the whole tile are clear.
-fn is_suspicious_tile(scene: &BakeScene, members: &[&Texel], is_crossed: &[bool]) -> bool {
+/// Whether the texels of a tile have to be probed thoroughly, and the rays cast. They need not be if all of the tile is
+/// hidden or all of it is open, and a few rays for the whole tile are clear; nor if no contact line is known to cross
+/// the tile, and one ray from each texel is clear.
+fn suspicious_tile(scene: &BakeScene, members: &[&Texel], is_crossed: &[bool]) -> (bool, u32) {
     if scene.stop.is_cancelled() {
-        return false;
+        return (false, 0);
     }
-    let probed = (0..TILE_PROBES).map(|ray| members[ray as usize * members.len() / TILE_PROBES as usize]);
+    let probes = if is_free_tile(scene, members) {
+        TILE_PROBES as usize
+    } else if members.iter().all(|texel| !is_crossed[texel.index.place()] && has_all_lines(scene, texel)) {
+        members.len().max(TILE_PROBES as usize)
+    } else {
+        return (true, 0);
+    };
+    let probed = (0..probes).map(|ray| members[ray * members.len() / probes]);
     let is_clear = |(ray, texel): (usize, &Texel)| probe(scene, texel, ray as u32) == Probe::Clear;
-    let is_uniform = is_between_contacts(scene, members, is_crossed) || is_free_tile(scene, members);
-    !(is_uniform && probed.enumerate().all(is_clear))
+    (!probed.enumerate().all(is_clear), probes as u32)
 }
 
-/// Whether all contact lines on the triangle of a tile are known, and none crosses the tile.
-fn is_between_contacts(scene: &BakeScene, members: &[&Texel], is_crossed: &[bool]) -> bool {
-    members.first().is_some_and(|first| has_area_for_lines(&scene.triangles[first.triangle as usize]))
-        && !members.iter().any(|texel| is_crossed[texel.index.place()])
+/// Whether the contact lines on everything that a texel shows have been searched for.
+fn has_all_lines(scene: &BakeScene, texel: &Texel) -> bool {
+    let has_lines = |triangle: u32| has_contact_lines(&scene.triangles[triangle as usize]);
+    match &texel.footprint {
+        Footprint::Whole(triangle) => has_lines(*triangle),
+        Footprint::Points(points) => points.iter().all(|point| has_lines(point.triangle)),
+        Footprint::Hidden => false,
+    }
 }
 
 /// Whether no geometry crosses the space in front of a tile.
@@ -218,6 +229,7 @@ fn classify(scene: &BakeScene, texel: &Texel, contacts: &ContactLines) -> OpenPo
     let Some(points) = fine_points(scene, texel) else { return OpenPoints::default() };
     let sequence = Sequence::new(SEED, Stream::HiddenView, texel.index.0);
     let clearance = min_clearance(scene, texel);
+    let knows_lines = has_all_lines(scene, texel);
     let mut rays = 0;
     let mut view_from = |index: usize| {
         let (view, cast) = point_view(scene, &points[index], sequence, index as u32, clearance);
@@ -229,7 +241,7 @@ fn classify(scene: &BakeScene, texel: &Texel, contacts: &ContactLines) -> OpenPo
     for group in between_lines(&points, contacts.in_texel(texel.index)) {
         let views: Vec<PointView> =
             corners_and_middle(&points, &group).into_iter().map(&mut view_from).collect();
-        let agreed = common_view(&views);
+        let agreed = if knows_lines { common_view(&views) } else { equal_view(&views) };
         for index in group {
             if agreed.unwrap_or_else(|| view_from(index)) == PointView::Open {
                 open[index / 64] |= 1 << (index % 64);
@@ -244,27 +256,32 @@ fn classify(scene: &BakeScene, texel: &Texel, contacts: &ContactLines) -> OpenPo
     OpenPoints { open, rays }
 }
 
-/// The view that all points have, if they agree. Those that saw only back faces side with the others: where the open is
-/// seen through few gaps, the rays of most points miss it.
+/// As [`equal_view`], but points that saw only back faces side with the others: where the open is seen through few gaps,
+/// the rays of most points miss it.
 fn common_view(views: &[PointView]) -> Option<PointView> {
     let mut certain = views.iter().copied().filter(|view| *view != PointView::BackFaces);
     let Some(first) = certain.next() else { return Some(PointView::BackFaces) };
     certain.all(|view| view == first).then_some(first)
 }
 
+/// The view that all points have, if it is the same.
+fn equal_view(views: &[PointView]) -> Option<PointView> {
+    views.first().copied().filter(|first| views.iter().all(|view| view == first))
+}
+
 /// The points of a footprint, by index, in groups that no contact line divides. A point on a line is a group of its own.
-/// The lines count as if they had no ends.
+/// Lines are treated as infinite.
 fn between_lines(points: &[FootprintPoint], lines: impl Iterator<Item = [DVec2; 2]>) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = vec![(0..points.len()).collect()];
     for [from, to] in lines {
         let Some(along) = (to - from).try_normalize() else { continue };
-        let beyond = |index: &usize| along.perp_dot(points[*index].offset.as_dvec2() - from);
+        let distance = |index: &usize| along.perp_dot(points[*index].offset.as_dvec2() - from);
         groups = groups
             .into_iter()
             .flat_map(|group| {
                 let (on_line, beside): (Vec<usize>, Vec<usize>) =
-                    group.into_iter().partition(|index| beyond(index).abs() < LINE_MARGIN);
-                let (left, right) = beside.into_iter().partition(|index| beyond(index) > 0.0);
+                    group.into_iter().partition(|index| distance(index).abs() < LINE_MARGIN);
+                let (left, right) = beside.into_iter().partition(|index| distance(index) > 0.0);
                 on_line.into_iter().map(|index| vec![index]).chain([left, right])
             })
             .filter(|group| !group.is_empty())

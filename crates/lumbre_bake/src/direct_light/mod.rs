@@ -10,7 +10,7 @@ pub(crate) mod local_light;
 pub(crate) mod shafts;
 pub(crate) mod shared_light;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeSet, HashMap};
 
 use glam::Vec3;
 
@@ -199,24 +199,33 @@ impl<'a> SourceSampler<'a> {
         direct: &mut [Direct],
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
-        // Per block, its texels outside of penumbrae less those in them.
-        let mut balance: BTreeMap<u32, i64> = BTreeMap::new();
-        for texel in self.unknown().filter(|texel| !self.texels.list[texel.place()].is_hidden()) {
-            let partly = direct[texel.place()].seen.partly;
-            *balance.entry(self.cuts.block(texel.place())).or_default() += if partly { -1 } else { 1 };
-        }
-        let is_penumbra = |block: u32| balance.get(&block).is_some_and(|balance| *balance < 0);
-        let lamps = self.shafts.unresolved(&self.cuts, |block, cut| cut.has_all_lamps && is_penumbra(block));
+        let lamps = monitor.run_interruptible(0.0, || {
+            let mut lamps = self.shafts.unresolved(&self.cuts, |_, cut| cut.has_all_lamps);
+            if lamps.is_empty() {
+                return lamps;
+            }
+            // Per block, its texels outside of penumbrae less those in them.
+            let mut balance: HashMap<u32, i64> = HashMap::new();
+            for texel in self.unknown().filter(|texel| !self.texels.list[texel.place()].is_hidden()) {
+                let change = if direct[texel.place()].seen.partly { -1 } else { 1 };
+                *balance.entry(self.cuts.block(texel.place())).or_default() += change;
+            }
+            lamps.retain(|(texel, _)| {
+                balance.get(&self.cuts.block(*texel as usize)).is_some_and(|balance| *balance < 0)
+            });
+            self.cuts.share(self.sources, &lamps);
+            lamps
+        })?;
         if lamps.is_empty() {
             return Ok(());
         }
-        self.cuts.share(self.sources, &lamps);
         let blocks: BTreeSet<u32> = lamps.iter().map(|(texel, _)| self.cuts.block(*texel as usize)).collect();
         let changed: Vec<CoveredTexel> =
             self.unknown().filter(|texel| blocks.contains(&self.cuts.block(texel.place()))).collect();
         for (texel, light) in changed.iter().zip(self.few_samples(&changed, monitor)?) {
-            let rays = direct[texel.place()].rays + light.rays;
-            direct[texel.place()] = Direct { rays, ..light };
+            // What was seen before tells the neighbours that a penumbra is near.
+            let Direct { rays, seen, .. } = direct[texel.place()];
+            direct[texel.place()] = Direct { rays: rays + light.rays, seen, ..light };
         }
         Ok(())
     }

@@ -119,13 +119,13 @@ impl<'a> Shafts<'a> {
         Some(TileOccluders { lamps, lights, open_texel: None })
     }
 
-    /// Lamps that have samples of their own in a block that `is_searched` accepts, by its number and cut, but whose
+    /// Lamps that have samples of their own in a block that `accepts_block` accepts, by its number and cut, but whose
     /// occluders are unknown in most of the block's tiles: pairs of a texel's index, which stands for its block, and
     /// the lamp.
     pub fn unresolved(
         &self,
         cuts: &LightCuts,
-        is_searched: impl Fn(u32, &LightCut) -> bool,
+        accepts_block: impl Fn(u32, &LightCut) -> bool,
     ) -> Vec<(u32, u32)> {
         // The number of tiles in each block; and for each block and lamp a texel and the number of tiles that do not
         // know the lamp's occluders.
@@ -135,7 +135,7 @@ impl<'a> Shafts<'a> {
             let block = cuts.block(texel as usize);
             *tiles.entry(block).or_default() += 1;
             let cut = cuts.of(texel as usize);
-            for &lamp in cut.lamps.iter().filter(|_| is_searched(block, cut)) {
+            for &lamp in cut.lamps.iter().filter(|_| accepts_block(block, cut)) {
                 if tile.lamps.iter().all(|occluders| occluders.node != lamp) {
                     unresolved.entry((block, lamp)).or_insert((texel, 0)).1 += 1;
                 }

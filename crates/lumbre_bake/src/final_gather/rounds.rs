@@ -33,7 +33,7 @@ const ROUND_PROGRESS: f32 = 0.7;
 const MIN_REDUCIBLE: f64 = 0.1;
 /// Fraction of the requested squared error that a round aims at. It is well below 1 because a round's outcome is
 /// predicted only roughly, and missing the request would cost another round, with another smoothing of everything.
-const TARGET: f64 = 0.55;
+const TARGET: f64 = 0.65;
 /// The rest of the way is a small step if the requested squared error is more than this fraction of the remaining one.
 /// When the quality's rays are spent, a small step may still be taken: a map that just misses the requested error helps
 /// nobody.
@@ -109,9 +109,9 @@ pub(crate) fn gather(
     let is_all_reused = reused.is_some() && wanted.is_empty();
     monitor.pass(ROUND_PROGRESS);
     let mut speed = CastSpeed::default();
-    let begun = monitor.seconds();
+    let (begun, samples) = (monitor.seconds(), all_samples(&gathered));
     let mut in_time = cast_first_round(cache, list, wanted, &mut gathered, options, monitor)?;
-    speed.add(monitor.seconds() - begun, &gathered);
+    speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
     let mut plan: Option<RoundPlan> = None;
     let mut stalled_rounds = 0;
     let mut reads = TexelReads::new(cache.patches.mean_reflectance(), &gathered);
@@ -137,9 +137,9 @@ pub(crate) fn gather(
         monitor.pass(ROUND_PROGRESS);
         let rest = planner.open.iter().map(|texel| reads.rest_in(&gathered[texel.place()])).sum::<f64>();
         reads.add(next.samples(&gathered), rest / planner.count());
-        let begun = monitor.seconds();
+        let (begun, samples) = (monitor.seconds(), all_samples(&gathered));
         in_time = cast(cache, list, &next.wanted, &mut gathered, options, monitor)?;
-        speed.add(monitor.seconds() - begun, &gathered);
+        speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
         plan = Some(next);
     };
     let RoundResult { light, variances, .. } = result;
@@ -155,6 +155,11 @@ pub(crate) fn gather(
     Ok(IndirectLight { light, variances, gathered })
 }
 
+/// Samples per replicate, of all texels together.
+fn all_samples(gathered: &[GatherSums]) -> u64 {
+    gathered.iter().map(|sums| u64::from(sums.samples)).sum()
+}
+
 /// How quickly samples are cast.
 #[derive(Default)]
 struct CastSpeed {
@@ -164,10 +169,10 @@ struct CastSpeed {
 }
 
 impl CastSpeed {
-    /// Adds the seconds of a round, after which so much is `gathered`.
-    fn add(&mut self, seconds: f64, gathered: &[GatherSums]) {
+    /// Adds the samples that were cast in so many seconds.
+    fn add(&mut self, samples: u64, seconds: f64) {
+        self.samples += samples;
         self.seconds += seconds;
-        self.samples = gathered.iter().map(|sums| u64::from(sums.samples)).sum();
     }
 
     /// For how many samples there is time if `reserved` seconds must be left afterwards.
@@ -315,7 +320,7 @@ impl<'a> RoundPlanner<'a> {
     }
 
     /// Allocates the rays of the next round such that they reduce the reducible part of the error to what is needed to
-    /// reach the requested one. There is time for so many `affordable` samples per replicate.
+    /// reach the requested one. At most `affordable` samples per replicate can be cast in the time that is left.
     fn plan(&self, gathered: &[GatherSums], result: &RoundResult, affordable: u64) -> RoundPlan {
         let [_, max_samples] = self.options.effort().gather.map(|samples| samples / REPLICATES as u32);
         // From the second round on, rays read the light of texels instead of patches, and so also reduce the error that
@@ -327,13 +332,12 @@ impl<'a> RoundPlanner<'a> {
         let requested = self.count() * self.options.error.powi(2);
 
         let samples: Vec<u32> = gathered.iter().map(|sums| sums.samples).collect();
-        let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
+        let cast = all_samples(gathered);
         let limit = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
         let budget = limit.saturating_sub(cast);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let requested_over_left = requested / result.relative_squares.max(f64::MIN_POSITIVE);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP;
-        let is_late = (affordable as f64) < MIN_ROUND * cast as f64;
         let (target, budget) = match is_small_step {
             true => {
                 let raised_limit = (limit as f64 * SMALL_STEP_RAYS) as u64;
@@ -350,11 +354,23 @@ impl<'a> RoundPlanner<'a> {
         let goal = goal * open_sum(self.texels, &by_rays.cautious) / reducible_error.max(f64::MIN_POSITIVE);
         let open = self.open.iter().copied();
         let errors = &by_rays.cautious;
-        let budget = budget.min(affordable);
-        let wanted = allocate_within(budget, open, errors, &samples, max_samples, CONVERGENCE_ORDER, goal);
+        let within = |budget: u64| {
+            allocate_within(budget, open.clone(), errors, &samples, max_samples, CONVERGENCE_ORDER, goal)
+        };
+        let mut wanted = within(budget);
+        let more = |allocation: &SampleAllocation| {
+            u64::from(allocation.samples) - u64::from(samples[allocation.texel.place()])
+        };
+        let is_short_of_time = wanted.iter().map(more).sum::<u64>() > affordable;
+        let is_late = is_short_of_time && (affordable as f64) < MIN_ROUND * cast as f64;
+        if is_late {
+            wanted = Vec::new();
+        } else if is_short_of_time {
+            wanted = within(affordable);
+        }
         RoundPlan {
             reducible_error,
-            is_last: (is_spent && !is_small_step) || wanted.is_empty(),
+            is_last: (is_spent && !is_small_step) || (wanted.is_empty() && !is_late),
             is_small_step,
             is_late,
             wanted,

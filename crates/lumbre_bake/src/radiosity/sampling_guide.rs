@@ -110,10 +110,13 @@ impl SamplingGuide {
             } else {
                 0.0
             };
+            if share == 0.0 {
+                return (share, Vec::new());
+            }
             if let Some(first) = members.first() {
                 unseen.add(larger.of[first.place()], &exchange, &mut flux);
             }
-            (share, if share > 0.0 { cumulative(flux) } else { Vec::new() })
+            (share, cumulative(flux))
         };
         let distributions = larger.rows(factors, share_and_row);
         let mut rows = Rows::new(distributions.len());

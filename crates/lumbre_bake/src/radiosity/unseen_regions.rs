@@ -2,7 +2,7 @@
 //! and bright region, such as the inside of a lamp's shaft behind a grille, may be hit by none of the few thousand rays
 //! of another region, though much of the light there comes from it. The guide would never choose it, and each cosine
 //! ray that finds it would be a firefly. What is known better is how much is exchanged with everything around the
-//! region, as that is hit by more rays.
+//! region, as that is hit by more rays. A region that saw no light at all stays without a guess.
 
 use std::collections::BTreeMap;
 
@@ -16,8 +16,6 @@ use crate::scene::BakeScene;
 const CUBE_SIDE: f32 = 2.0;
 /// Most regions of a cube that are guessed at: those that the most light leaves.
 const MAX_BRIGHT: usize = 64;
-/// The guess as a share of the light that it would bring if all of a cube were seen equally well.
-const GUESS: f64 = 1.0;
 /// Most of the guess, as a share of the known light.
 const MAX_GUESS: f64 = 0.8;
 /// Guesses below this share of the known light are left out, so that rows stay short.
@@ -65,11 +63,12 @@ impl UnseenRegions {
         for cube in &mut unseen.cubes {
             cube.bright.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
             cube.bright.truncate(MAX_BRIGHT);
+            cube.bright.shrink_to_fit();
         }
         unseen
     }
 
-    /// Adds guesses to the light that `receiver` gets from other regions: `flux`, by the number of the region,
+    /// Adds guesses, as if all of a cube were seen equally well, to the light that `receiver` gets from other regions: `flux`, by the number of the region,
     /// ascending, according to the exchange areas of the same regions.
     pub fn add(&self, receiver: PatchIndex, exchange: &[(PatchIndex, f64)], flux: &mut Vec<(u32, f64)>) {
         let known: f64 = flux.iter().map(|(_, flux)| flux).sum();
@@ -81,7 +80,7 @@ impl UnseenRegions {
         for (number, g) in by_cube {
             let cube = &self.cubes[number as usize];
             for &(region, power) in &cube.bright {
-                let guess = GUESS * g * power / cube.area;
+                let guess = g * power / cube.area;
                 if guess.is_nan() || guess < MIN_GUESS * known {
                     break;
                 }
@@ -90,6 +89,9 @@ impl UnseenRegions {
                 }
             }
         }
+        // A row has at most as many guesses as known entries, so that memory follows from the rays of the form factors.
+        guesses.sort_unstable_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        guesses.truncate(flux.len());
         let total: f64 = guesses.iter().map(|(_, guess)| guess).sum();
         let scale = (MAX_GUESS * known / total).min(1.0);
         flux.extend(guesses.into_iter().map(|(region, guess)| (region, guess * scale)));
@@ -109,5 +111,54 @@ impl UnseenRegions {
             (self.places[receiver.place()], self.places[other.place()]);
         let along = to - from;
         along.dot(normal) > 0.0 && along.dot(other_normal) < 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Regions in two cubes: 0 is the receiver, on the floor of the first; 1 to 4 are in the second, above it. 1 is
+    /// large and dark, 2 small and bright, 3 bright but turned away, and 4 beneath the receiver's plane.
+    fn unseen() -> UnseenRegions {
+        let up = Vec3::Y;
+        let places = vec![
+            (Vec3::ZERO, up),
+            (Vec3::new(0.0, 3.0, 0.0), -up),
+            (Vec3::new(1.0, 3.0, 0.0), -up),
+            (Vec3::new(1.0, 3.0, 1.0), up),
+            (Vec3::new(0.0, -3.0, 0.0), -up),
+        ];
+        let bright =
+            vec![(PatchIndex(2), 50.0), (PatchIndex(3), 50.0), (PatchIndex(4), 50.0), (PatchIndex(1), 1.0)];
+        let cubes = vec![Cube { area: 1.0, bright: Vec::new() }, Cube { area: 10.0, bright }];
+        UnseenRegions { places, cube_of: vec![0, 1, 1, 1, 1], cubes }
+    }
+
+    #[test]
+    fn a_bright_region_beside_one_that_was_seen_is_guessed_at() {
+        // Only the dark region was hit by rays.
+        let mut flux = vec![(1, 0.2)];
+        unseen().add(PatchIndex(0), &[(PatchIndex(1), 1.0)], &mut flux);
+        // All that is guessed brings at most a certain share of what is known, and there is no more than one guess
+        // for one known region.
+        assert_eq!(flux.iter().map(|(region, _)| *region).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!(flux[0].1, 0.2);
+        assert!((flux[1].1 / (0.2 * MAX_GUESS) - 1.0).abs() < 1e-9, "{flux:?}");
+    }
+
+    #[test]
+    fn a_guess_that_is_small_beside_the_known_light_is_left_out() {
+        let known = 50.0 / 10.0 / MIN_GUESS * 1.01;
+        let mut flux = vec![(1, known)];
+        unseen().add(PatchIndex(0), &[(PatchIndex(1), 1.0)], &mut flux);
+        assert_eq!(flux, [(1, known)]);
+    }
+
+    #[test]
+    fn without_known_light_there_is_nothing_to_guess() {
+        let mut flux = Vec::new();
+        unseen().add(PatchIndex(0), &[], &mut flux);
+        assert!(flux.is_empty());
     }
 }

@@ -100,7 +100,7 @@ impl LightCut {
     }
 }
 
-/// Up to this many lamps, all are sampled individually: their exact light, or their exact unoccluded light times the
+/// Up to this many lamps, all are sampled individually, except in their penumbrae: their exact light, or their exact unoccluded light times the
 /// visible fraction, is less noisy than shared samples.
 const FEW_LAMPS: u32 = 8;
 /// With more emitters than this in the scene, the lamps are never all sampled individually.
@@ -157,7 +157,7 @@ impl Sources<'_> {
         let mut cut = LightCut { lights: self.individually_sampled_lights.clone(), ..LightCut::default() };
         let mut roots = Vec::new();
         let few_lamps = self.few_lamps(receiver);
-        let are_lamps_few = few_lamps.is_some();
+        let has_few_lamps = few_lamps.is_some();
         match few_lamps {
             Some(lamps) => {
                 let (sharing, individual): (Vec<u32>, _) =
@@ -191,7 +191,7 @@ impl Sources<'_> {
         let mut individual = 0;
         closed.retain(|node| {
             let may_be_individual = match node.branch {
-                Branch::Emitters(lamp) => !are_lamps_few && !shared.contains(&lamp),
+                Branch::Emitters(lamp) => !has_few_lamps && !shared.contains(&lamp),
                 Branch::Lights(_) => true,
             };
             let is_individual = may_be_individual
