@@ -116,8 +116,8 @@ fn a_patch_reflects_the_mean_of_its_texels() {
 
 #[test]
 fn a_patch_that_shows_too_many_texels_is_named() {
-    // Repeated `scale` times in each direction, a triangle shows 91 times as many texels along its diagonal, and
-    // points for half of them are enough.
+    // A triangle shows 91 texels along its diagonal for each repetition of the texture. Points for half of them are
+    // enough, and there may be 64.
     for (scale, expected) in [(1.0, false), (2.0, true)] {
         let mut scene = textured(|x, _| x.is_multiple_of(8));
         let textures = scene.surfaces[0].textures.as_mut().expect("a textured surface");

@@ -446,7 +446,7 @@ fn reflectance_and_texels(
 }
 
 /// Points along a patch's edge, n for n² points in all, at which its textures are averaged. A few texels are averaged
-/// with a point for each of them along the longest edge, which makes up to four of them per texel. Of many, one point
+/// with a point for each of them along the longest edge, which makes at least two per texel. Of many, one point
 /// per texel is enough, and one for every two texels along an edge, since bilinear filtering reads two.
 fn texture_points(texels: ShownTexels) -> f32 {
     texels.edge.min(FEW_TEXELS).max(texels.area.sqrt()).max(0.5 * texels.edge)

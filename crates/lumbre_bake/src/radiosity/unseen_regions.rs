@@ -68,8 +68,8 @@ impl UnseenRegions {
         unseen
     }
 
-    /// Adds guesses, as if all of a cube were seen equally well, to the light that `receiver` gets from other regions: `flux`, by the number of the region,
-    /// ascending, according to the exchange areas of the same regions.
+    /// Adds guesses, as if all of a cube were seen equally well, to the light that `receiver` gets from other regions.
+    /// That is `flux`, by the number of the region, ascending; `exchange` has the exchange areas of the same regions.
     pub fn add(&self, receiver: PatchIndex, exchange: &[(PatchIndex, f64)], flux: &mut Vec<(u32, f64)>) {
         let known: f64 = flux.iter().map(|(_, flux)| flux).sum();
         let mut by_cube: BTreeMap<u32, f64> = BTreeMap::new();
@@ -119,7 +119,8 @@ mod tests {
     use super::*;
 
     /// Regions in two cubes: 0 is the receiver, on the floor of the first; 1 to 4 are in the second, above it. 1 is
-    /// large and dark, 2 small and bright, 3 bright but turned away, and 4 beneath the receiver's plane.
+    /// large and dark, 2 small and bright; 3 and 4 are brighter, but one is turned away and one beneath the receiver's
+    /// plane.
     fn unseen() -> UnseenRegions {
         let up = Vec3::Y;
         let places = vec![
@@ -130,7 +131,7 @@ mod tests {
             (Vec3::new(0.0, -3.0, 0.0), -up),
         ];
         let bright =
-            vec![(PatchIndex(2), 50.0), (PatchIndex(3), 50.0), (PatchIndex(4), 50.0), (PatchIndex(1), 1.0)];
+            vec![(PatchIndex(3), 60.0), (PatchIndex(4), 60.0), (PatchIndex(2), 50.0), (PatchIndex(1), 1.0)];
         let cubes = vec![Cube { area: 1.0, bright: Vec::new() }, Cube { area: 10.0, bright }];
         UnseenRegions { places, cube_of: vec![0, 1, 1, 1, 1], cubes }
     }
