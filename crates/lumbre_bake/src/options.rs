@@ -197,7 +197,7 @@ impl Quality {
                 form_factor_rays_per_texel: 0.04,
                 patch_texels: 4.0,
                 direct: [8, 64, 1024],
-                shared: [8, 1024],
+                shared: [8, 8192],
                 gather: [16, 8192],
                 mean: 64,
             },
