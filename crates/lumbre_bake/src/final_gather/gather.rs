@@ -5,7 +5,7 @@
 //! Not where rays go and what they hit: that is `incident`.
 
 use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::gather_sums::GatherSums;
+use crate::final_gather::gather_sums::{GatherSums, UnguidedLight};
 use std::cell::RefCell;
 
 use glam::{Vec2, Vec3};
@@ -21,6 +21,10 @@ use crate::scene::material::Side;
 
 /// One in this many samples also traces a real bounce, to check the patch that it reads.
 const CHECK_INTERVAL: u32 = 4;
+
+/// The guide would hardly have led to a point if a sample's weight is more than this share of what it would be there
+/// without the guide's samples.
+const UNGUIDED: f32 = 0.9;
 
 /// Most real bounces that one path makes between surfaces too near to each other for patches.
 const NEAR_BOUNCES: u32 = 6;
@@ -91,6 +95,10 @@ struct GatherContribution {
     texel_variance: f32,
     /// Whether the light of a texel was read, not that of a patch.
     reads_texel: bool,
+    /// The patch that was hit.
+    patch: PatchIndex,
+    /// Whether the guide would hardly have led there.
+    is_unguided: bool,
     /// Whether the patch that was read is checked against a real bounce.
     is_checked: bool,
     /// By how much the patch gives more light than the real bounce; before the check has run, the weight of that.
@@ -106,6 +114,8 @@ impl GatherContribution {
         error: Vec2::ZERO,
         texel_variance: 0.0,
         reads_texel: false,
+        patch: PatchIndex(0),
+        is_unguided: false,
         is_checked: false,
         difference: Vec3::ZERO,
         rays: 0,
@@ -169,6 +179,8 @@ impl RadianceCache<'_> {
                 ..GatherContribution::NONE
             };
             let Some(hit) = &mut incident.hit else { continue };
+            contribution.patch = hit.patch;
+            contribution.is_unguided = samples.paths[slot].cosine_share() * incident.weight > UNGUIDED;
             if hit.is_steep {
                 let sequence = Sequence::new(seed, Stream::SteepLight(replicate as u32), texel.index.0);
                 let (direct, rays) = self.direct_light_at(hit, sequence.of(sample));
@@ -207,6 +219,10 @@ impl RadianceCache<'_> {
             gathered.checks += u32::from(contribution.is_checked);
             gathered.differences += contribution.difference;
             gathered.squared_differences += (contribution.difference.element_sum() / 3.0).powi(2);
+            let light = contribution.light.element_sum() / 3.0;
+            if contribution.is_unguided && light > gathered.unguided.light {
+                gathered.unguided = UnguidedLight { patch: contribution.patch, light };
+            }
         }
         samples.count = 0;
     }

@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::denoise::replicates::REPLICATES;
+use crate::radiosity::patch_index::PatchIndex;
 
 /// Sums of the weights of a replicate's samples. The expected weight is 1, so the effect of a mean weight that differs
 /// from 1 can be removed from the estimate: the weight is a control variate, with its coefficient by regression (Owen
@@ -26,6 +27,25 @@ impl Weights {
         self.squares += weight * weight;
         self.products += weight * light;
         self.light_squares += (light.element_sum() / 3.0).powi(2);
+    }
+}
+
+/// The brightest light that a sample brought although the guide would hardly have led there.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct UnguidedLight {
+    /// The patch that it came from.
+    pub patch: PatchIndex,
+    /// What it added to the sums, W/m², mean of the channels; 0 if there was none.
+    pub light: f32,
+}
+
+impl UnguidedLight {
+    pub const NONE: Self = Self { patch: PatchIndex(0), light: 0.0 };
+}
+
+impl Default for UnguidedLight {
+    fn default() -> Self {
+        Self::NONE
     }
 }
 
@@ -52,6 +72,7 @@ pub(crate) struct GatherSums {
     pub samples: u32,
     /// Rays cast.
     pub rays: u64,
+    pub unguided: UnguidedLight,
 }
 
 /// Variance of the weights below which they count as equal.
@@ -103,6 +124,11 @@ impl GatherSums {
     /// changes (Ward, Rubinstein and Clear, "A Ray Tracing Solution for Diffuse Interreflection", 1988).
     pub fn inverse_distance(&self) -> f32 {
         self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
+    }
+
+    /// The sum of all samples of all replicates, W/m², mean of the channels.
+    pub fn total(&self) -> f32 {
+        self.sums.iter().sum::<Vec3>().element_sum() / 3.0
     }
 
     /// The share of the samples that read a texel gathered in an earlier round, in [0, 1].

@@ -129,6 +129,11 @@ impl SamplePath {
         row_part: RowPart::NONE,
         texel: MapTexel::NONE,
     };
+
+    /// The share of the samples that go in directions of a cosine distribution.
+    pub fn cosine_share(&self) -> f32 {
+        1.0 - self.guided_share.unwrap_or(0.0)
+    }
 }
 
 /// The density of [`sample_cosine`]: cos θ / π about the shading normal, with what lies below the facet mirrored up.
@@ -259,7 +264,7 @@ impl RadianceCache<'_> {
             }
             &SampleTarget::Direction(direction) => {
                 // Only these samples find the sky and the black insides, which the guide does not know.
-                let cosine_share = 1.0 - path.guided_share.unwrap_or(0.0);
+                let cosine_share = path.cosine_share();
                 match self.scene.first_hit(origin, direction) {
                     SurfaceHit::Lit { triangle, side, at, distance } => {
                         result.hit = Some(Hit { triangle, side, at, direction, distance, ..Hit::UNREAD });

@@ -6,6 +6,7 @@ pub(crate) mod error_ledger;
 pub(crate) mod gather;
 pub(crate) mod gather_sums;
 pub(crate) mod incident;
+pub(crate) mod learned_guide;
 pub(crate) mod lit_texels;
 pub(crate) mod map_error;
 pub(crate) mod patch_fallback;

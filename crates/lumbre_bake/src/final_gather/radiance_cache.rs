@@ -1,6 +1,8 @@
 //! The light that leaves surfaces, for the gather's rays to read: direct light by texel, light by bounces by patch or,
 //! once a round has gathered it, by texel. Not the rays: they are `gather`'s and `incident`'s.
 
+use std::borrow::Cow;
+
 use glam::{Vec2, Vec3};
 
 use super::steep_light::steep_texels;
@@ -41,7 +43,7 @@ pub(crate) struct RadianceCache<'a> {
     /// Radius on a surface within which the errors that rounds leave in texels are correlated, canonical units.
     pub correlation_radius: f32,
     /// Which regions the light of each region comes from.
-    pub guide: &'a SamplingGuide,
+    pub guide: Cow<'a, SamplingGuide>,
     /// Samples of each replicate in the first round.
     pub first_round_samples: u32,
 }
@@ -85,7 +87,7 @@ impl<'a> RadianceCache<'a> {
             patch_indirect: &exchange.indirect,
             patch_error: &exchange.indirect_error,
             min_read_distance: &exchange.near,
-            guide: &exchange.guide,
+            guide: Cow::Borrowed(&exchange.guide),
             first_round_samples: effort.gather[0] / REPLICATES as u32,
         })
     }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::error_estimate::{PatchBias, TexelReads, patch_bias};
 use super::error_ledger::{ErrorLedger, GatherErrors, open_sum};
 use super::gather_sums::GatherSums;
+use super::learned_guide::learn;
 use super::map_error::MapError;
 use super::patch_fallback::from_patches;
 use super::radiance_cache::RadianceCache;
@@ -133,6 +134,7 @@ pub(crate) fn gather(
         let variances = &result.reducible.expected;
         monitor.run_interruptible(1.0, || {
             cache.texels.set_indirect(list, &gathered, &result.light, variances);
+            learn(cache, list, &mut gathered);
         })?;
         monitor.pass(ROUND_PROGRESS);
         let rest = planner.open.iter().map(|texel| reads.rest_in(&gathered[texel.place()])).sum::<f64>();

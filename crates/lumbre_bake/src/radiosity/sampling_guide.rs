@@ -5,6 +5,8 @@
 //! how much light leaves each, so that a beam of sunlight in a dark region is found. Bright regions that the rays of the
 //! form factors have missed are added by `unseen_regions`. The samples are taken in `final_gather`.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 
 use super::form_factors::FormFactors;
@@ -15,7 +17,7 @@ use super::unseen_regions::UnseenRegions;
 use crate::scene::BakeScene;
 
 /// A region of the guide, by its place among all regions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Region(u32);
 
 /// For each region, the regions that light it by bounces, with probabilities in proportion to the irradiance that they
@@ -29,6 +31,18 @@ pub(crate) struct SamplingGuide {
     first_members: Vec<u32>,
     /// Per patch, how it is chosen within its region.
     patches: Vec<PatchInRegion>,
+    unseen: UnseenRegions,
+}
+
+/// Light that reaches a region from a patch that the guide hardly ever chooses for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Discovery {
+    /// The region that receives the light.
+    pub receiver: Region,
+    /// Where it comes from.
+    pub patch: PatchIndex,
+    /// Its share of all light by bounces that the region receives.
+    pub share: f64,
 }
 
 /// A patch of a region, and the sum of the probabilities of the region's patches up to and including it; the last sum
@@ -62,6 +76,10 @@ pub(crate) struct GuidedPatch {
 /// the weights of both strategies.
 const MAX_SHARE: f32 = 0.4;
 const SHARE_STEPS: f32 = 8.0;
+
+/// Most of a region's distribution that discoveries make up together: one sample says little about how much light comes
+/// that way.
+const MAX_DISCOVERED: f64 = 0.5;
 
 /// Patches along a region's side.
 const REGION_SIDE: f32 = 4.0;
@@ -105,11 +123,7 @@ impl SamplingGuide {
             };
             let by_sky: f64 = members.iter().map(sky_flux).sum();
             let share = by_bounces / (by_bounces + by_sky);
-            let share = if share.is_finite() {
-                (MAX_SHARE * SHARE_STEPS * share as f32).round() / SHARE_STEPS
-            } else {
-                0.0
-            };
+            let share = if share.is_finite() { rounded_share(share) } else { 0.0 };
             if share == 0.0 {
                 return (share, Vec::new());
             }
@@ -130,6 +144,7 @@ impl SamplingGuide {
                 .iter()
                 .map(|region| PatchInRegion { region: Region(region.0), density: 0.0 })
                 .collect(),
+            unseen,
             ..Self::empty()
         };
         for (members, mean) in larger.members.iter().zip(&radiosity_of_regions) {
@@ -141,7 +156,13 @@ impl SamplingGuide {
 
     /// Knows nothing of any patch.
     fn empty() -> Self {
-        Self { rows: Rows::new(0), members: Vec::new(), first_members: vec![0], patches: Vec::new() }
+        Self {
+            rows: Rows::new(0),
+            members: Vec::new(),
+            first_members: vec![0],
+            patches: Vec::new(),
+            unseen: UnseenRegions::default(),
+        }
     }
 
     /// Appends the patches of the next region, each chosen in proportion to its weight.
@@ -160,6 +181,53 @@ impl SamplingGuide {
             start = end;
         }
         self.first_members.push(self.members.len() as u32);
+    }
+
+    /// The guide with `discoveries`, which are sorted by their receivers. Half of what is discovered counts for the region
+    /// that it came from, the other half for all bright regions around that one.
+    pub fn with(&self, discoveries: &[Discovery]) -> Self {
+        let mut rows = Rows { part_bits: self.rows.part_bits, ..Rows::default() };
+        let mut left = discoveries;
+        for number in 0..self.rows.heads.len() as u32 {
+            let discovered;
+            (discovered, left) =
+                left.split_at(left.partition_point(|discovery| discovery.receiver.0 <= number));
+            let known = self.rows.entries_of(number);
+            let share = self.rows.heads[number as usize].share;
+            let total = discovered.iter().map(|discovery| discovery.share).sum::<f64>();
+            if total == 0.0 {
+                rows.push(share, known);
+                continue;
+            }
+            let (share, weight) = match known.is_empty() {
+                true => (rounded_share(total.min(1.0)).max(1.0 / SHARE_STEPS), total),
+                false => (share, total.min(MAX_DISCOVERED)),
+            };
+            let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
+            for (region, share) in discovered.iter().flat_map(|discovery| self.spread(discovery)) {
+                *weights.entry(region).or_default() += weight * share / total;
+            }
+            let mut start = 0.0;
+            for entry in known {
+                *weights.entry(entry.column).or_default() += (1.0 - weight) * f64::from(entry.end - start);
+                start = entry.end;
+            }
+            rows.push(share, &cumulative(weights.into_iter().collect()));
+        }
+        Self { rows, ..self.clone() }
+    }
+
+    /// The regions to which a discovery leads, with their parts of its share.
+    fn spread(&self, discovery: &Discovery) -> Vec<(u32, f64)> {
+        let origin = self.patches[discovery.patch.place()].region;
+        let near = self.unseen.around(PatchIndex(discovery.receiver.0), PatchIndex(origin.0));
+        let power: f64 = near.iter().map(|(_, power)| power).sum();
+        if power.is_nan() || power <= 0.0 {
+            return vec![(origin.0, discovery.share)];
+        }
+        let half = 0.5 * discovery.share;
+        let of_near = near.into_iter().map(|(region, near_power)| (region.0, half * near_power / power));
+        of_near.chain([(origin.0, half)]).collect()
     }
 
     /// The region of a patch; `None` if the guide knows nothing of it.
@@ -203,6 +271,11 @@ impl SamplingGuide {
         let PatchInRegion { region, density } = self.patches[patch.place()];
         self.rows.probability(part, region.0) * density
     }
+}
+
+/// The share of the samples that the guide places where it knows the origin of this part of the light.
+fn rounded_share(known: f64) -> f32 {
+    (MAX_SHARE * SHARE_STEPS * known as f32).round() / SHARE_STEPS
 }
 
 /// Sparse discrete distributions over the same columns, one per row. They are too large for the near caches, so what is
@@ -302,6 +375,11 @@ impl Rows {
         let entry =
             self.entries.get(begin + middle as usize).copied().unwrap_or(Entry { column: 0, end: 1.0 });
         RowPart { begin, count, first, last, middle, entry }
+    }
+
+    fn entries_of(&self, row: u32) -> &[Entry] {
+        let Head { start, count, .. } = self.heads[row as usize];
+        &self.entries[start..start + count as usize]
     }
 
     fn share(&self, row: u32) -> Option<f32> {
@@ -416,6 +494,30 @@ mod tests {
         }
         assert_eq!(picked, [300, 0, 900, 400]);
         assert_eq!(guide.region_of(PatchIndex(4)), None);
+    }
+
+    #[test]
+    fn what_is_discovered_becomes_a_part_of_the_distribution() {
+        let patches = [0, 1, 2].map(|region| PatchInRegion { region: Region(region), density: 0.0 });
+        let mut rows = Rows::new(3);
+        rows.push(0.25, &cumulative(vec![(0, 3.0), (1, 1.0)]));
+        rows.push(0.25, &cumulative(vec![(0, 1.0)]));
+        rows.push(0.0, &[]);
+        let guide = SamplingGuide { rows, patches: patches.to_vec(), ..SamplingGuide::empty() };
+        let discovery = |receiver, patch, share| Discovery {
+            receiver: Region(receiver),
+            patch: PatchIndex(patch),
+            share,
+        };
+        let learned = guide.with(&[discovery(0, 1, 0.125), discovery(0, 2, 0.125), discovery(2, 1, 0.01)]);
+        let row = |number| [0, 1, 2].map(|column| probability(&learned.rows, number, column));
+        assert_eq!(row(0), [0.75 * 0.75, 0.75 * 0.25 + 0.125, 0.125]);
+        assert_eq!(row(1), [1.0, 0.0, 0.0], "nothing new");
+        assert_eq!(row(2), [0.0, 1.0, 0.0], "nothing was known");
+        assert_eq!([0, 1, 2].map(|number| learned.rows.share(number)), [Some(0.25), Some(0.25), Some(0.125)]);
+        // However bright a single sample was, as much is left of what was known.
+        let learned = guide.with(&[discovery(0, 2, 0.9)]);
+        assert_eq!(f64::from(probability(&learned.rows, 0, 2)), MAX_DISCOVERED);
     }
 
     #[test]

@@ -22,6 +22,7 @@ const MAX_GUESS: f64 = 0.8;
 const MIN_GUESS: f64 = 3e-4;
 
 /// Where each region is, and which regions of each cube give off the most light.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct UnseenRegions {
     /// Centroid and normal of each region.
     places: Vec<(Vec3, Vec3)>,
@@ -105,6 +106,13 @@ impl UnseenRegions {
         });
     }
 
+    /// The brightest regions near `region` that lie in front of `receiver`, each with the power that leaves it.
+    pub fn around(&self, receiver: PatchIndex, region: PatchIndex) -> Vec<(PatchIndex, f64)> {
+        let cube = self.cube_of.get(region.place()).map(|&cube| &self.cubes[cube as usize]);
+        let bright = cube.map_or(&[][..], |cube| &cube.bright);
+        bright.iter().copied().filter(|&(near, _)| self.face_each_other(receiver, near)).collect()
+    }
+
     /// Whether the middles of two regions lie in front of each other.
     fn face_each_other(&self, receiver: PatchIndex, other: PatchIndex) -> bool {
         let ((from, normal), (to, other_normal)) =
@@ -154,6 +162,13 @@ mod tests {
         let mut flux = vec![(1, known)];
         unseen().add(PatchIndex(0), &[(PatchIndex(1), 1.0)], &mut flux);
         assert_eq!(flux, [(1, known)]);
+    }
+
+    #[test]
+    fn around_a_region_are_the_bright_ones_that_face_the_receiver() {
+        let near = unseen().around(PatchIndex(0), PatchIndex(1));
+        assert_eq!(near, [(PatchIndex(2), 50.0), (PatchIndex(1), 1.0)]);
+        assert!(UnseenRegions::default().around(PatchIndex(0), PatchIndex(1)).is_empty());
     }
 
     #[test]

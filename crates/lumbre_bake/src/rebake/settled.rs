@@ -1,11 +1,12 @@
 //! How the gathered light of a finished bake is serialized: without the weights, which follow from the other fields
-//! once samples are settled ([`GatherSums::settled`]), and without the number of rays.
+//! once samples are settled ([`GatherSums::settled`]), without the number of rays, and without what was found beside the
+//! guide, as the next bake has another guide.
 
 use glam::Vec3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::gather_sums::{GatherSums, Weights};
+use crate::final_gather::gather_sums::{GatherSums, UnguidedLight, Weights};
 
 /// For serde's `with`: writes the fields that are kept, in the order in which [`deserialize`] reads them.
 pub(super) fn serialize<S: Serializer>(gathered: &GatherSums, serializer: S) -> Result<S::Ok, S::Error> {
@@ -22,6 +23,7 @@ pub(super) fn serialize<S: Serializer>(gathered: &GatherSums, serializer: S) -> 
         inverse_distances,
         samples,
         rays: _,
+        unguided: _,
     } = gathered;
     let rays = (patch_errors, texel_variances, texel_reads, inverse_distances);
     (sums, samples, rays, (checks, differences, squared_differences)).serialize(serializer)
@@ -45,5 +47,6 @@ pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
         inverse_distances,
         samples,
         rays: 0,
+        unguided: UnguidedLight::NONE,
     })
 }
