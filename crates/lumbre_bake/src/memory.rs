@@ -71,7 +71,8 @@ const GUIDED_PATCH_BYTES: u64 =
     (4 + 8 + 4 + 8 + 8 + size_of::<Patch>() + 16 + 28 + 16 + 8 + 8 + 28 + 2 * 16) as u64;
 
 /// Per form factor ray, for the sampling guide: two pairs of regions and as many guesses, each an index and a
-/// probability, in lists that may have grown to twice their length.
+/// probability, in lists that may have grown to twice their length. What the guide learns between rounds doubles that, but
+/// by then the form factors themselves are freed, which need as much.
 const GUIDE_PAIR_BYTES: u64 = 2 * 2 * 2 * (4 + 4);
 
 /// Per covered texel, for the samples that the bake returns.
