@@ -12,7 +12,7 @@ use crate::checkpoint::CheckpointFile;
 use crate::chunks::decide;
 use crate::content_hash::hashes_of;
 use crate::coverage::covered_texels::CoveredTexels;
-use crate::direct_light::direct_light;
+use crate::direct_light::{SHORT_OF_TIME, direct_light};
 use crate::final_gather::lit_texels::LitTexels;
 use crate::final_gather::radiance_cache::RadianceCache;
 use crate::final_gather::rounds::{self, IndirectLight};
@@ -304,10 +304,6 @@ fn run(
     let volume = volume.map(|placed| (placed.grid.transform(space), placed.volume));
     Ok(BakeOutput { objects, maps, volume, samples })
 }
-
-/// If more than this share of the time for direct light has passed before that stage computes any light, time is short
-/// for a scene of this size.
-const SHORT_OF_TIME: f64 = 0.3;
 
 /// Reports why there is no light to bake.
 fn nothing_to_bake(why: &str, report: &mut BakeReport) -> BakeOutput {

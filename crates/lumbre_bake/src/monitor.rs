@@ -75,12 +75,12 @@ impl Stage {
         let (name, of_time, of_limit) = match self {
             Self::Layout => ("layout", 0.03, 1.0),
             Self::Hierarchy => ("hierarchy", 0.02, 1.0),
-            Self::DirectLight => ("direct light", 0.2, 0.42),
-            Self::FormFactors => ("form factors", 0.1, 0.52),
-            Self::Radiosity => ("radiosity", 0.05, 0.52),
-            Self::FinalGather => ("final gather", 0.48, 0.86),
-            Self::Probes => ("probes", 0.05, 0.93),
-            Self::Resolution => ("resolution", 0.02, 0.95),
+            Self::DirectLight => ("direct light", 0.2, 0.38),
+            Self::FormFactors => ("form factors", 0.1, 0.46),
+            Self::Radiosity => ("radiosity", 0.05, 0.46),
+            Self::FinalGather => ("final gather", 0.48, 0.93),
+            Self::Probes => ("probes", 0.05, 0.95),
+            Self::Resolution => ("resolution", 0.02, 0.97),
             Self::Texels => ("texels", 0.03, 1.0),
             Self::Seams => ("seams", 0.02, 1.0),
         };

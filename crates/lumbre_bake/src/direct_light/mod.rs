@@ -81,10 +81,10 @@ pub(crate) fn direct_light(
             monitor.cut_short();
             break;
         }
-        let begun = monitor.seconds();
         let options = BakeOptions { error, ..*options };
         let goals = ErrorGoals::new(sources, texels, &options, shared.is_some());
         sampler.resample(&mut doubtful, &mut direct, options.effort().direct, monitor)?;
+        let begun = monitor.seconds();
         sampler.refine(
             &mut doubtful,
             &mut direct,
@@ -173,9 +173,13 @@ impl<'a> SourceSampler<'a> {
     ) -> Result<Vec<Direct>, BakeError> {
         let [few, ..] = self.options.effort().direct;
         let clock = monitor.clock();
+        let is_time_short = decide(monitor, clock.is_past(SHORT_OF_TIME))?;
         monitor.pass(PASS);
         in_chunks(texels.len(), monitor, |place| {
-            self.light(texels[place], if clock.is_over() { few.min(LATE_SAMPLES) } else { few })
+            self.light(
+                texels[place],
+                if is_time_short || clock.is_over() { few.min(LATE_SAMPLES) } else { few },
+            )
         })
     }
 
@@ -327,29 +331,33 @@ struct DoubtfulTexels {
     samples: Vec<u32>,
 }
 
-/// The errors to aim at, one after the other. With a time limit they begin with a coarse one and go down by halves to
-/// the requested one: whenever the time is up, all texels are about equally good.
+/// The errors to aim at, one after the other. With a time limit they begin with a coarse one and go down by steps of
+/// [`GOAL_STEP`] to the requested one: whenever the time is up, all texels are about equally good.
 fn error_goals(options: &BakeOptions) -> Vec<f64> {
     let mut goals = vec![options.error];
     while options.time.is_some() && goals[goals.len() - 1] < MIN_FIRST_GOAL {
-        goals.push(2.0 * goals[goals.len() - 1]);
+        goals.push(GOAL_STEP * goals[goals.len() - 1]);
     }
     goals.reverse();
     goals
 }
 
-/// Under a time limit the first error to aim at is at least this one, and less than twice as large.
+/// Under a time limit the first error to aim at is at least this one.
 const MIN_FIRST_GOAL: f64 = 0.08;
 
-/// Whether there is too little time to aim at half the error of the last goal, which took so many seconds.
+/// Each goal is so many times the next one. A step of 2 left up to half of the time unused, as the last goal that fits is
+/// reached early or the next one does not fit.
+const GOAL_STEP: f64 = std::f64::consts::SQRT_2;
+
+/// Whether there is too little time to aim at the goal after the last one, whose refinement took so many seconds.
 fn is_late_for_finer_goal(seconds: f64, monitor: &mut BakeMonitor<'_>) -> Result<bool, BakeError> {
     let is_late = monitor.clock().seconds_left().is_some_and(|left| left < TIME_OF_NEXT_GOAL * seconds);
     decide(monitor, is_late)
 }
 
-/// How many times as long as a goal the next one takes, which allows half its error: a quarter of the squared error takes
-/// 4^(1 / [`ORDER`]) times the samples.
-const TIME_OF_NEXT_GOAL: f64 = 2.5;
+/// How many times as long as a goal the next one takes: half of the squared error takes 2^(1 / [`ORDER`]) times the
+/// samples.
+const TIME_OF_NEXT_GOAL: f64 = 1.6;
 
 /// The light of a texel from a previous bake.
 fn known_light(known: &[Option<Direct>], texel: CoveredTexel) -> Option<Direct> {
@@ -426,7 +434,11 @@ const ORDER: f64 = 1.5;
 const PASS: f32 = 0.5;
 const PASS_OF_LOCAL_LIGHT: f32 = 0.2;
 
-/// Shadow rays of a texel once the time is up: still enough to estimate the error from their spread.
+/// If more than this share of the time for direct light has passed before any is computed, time is short for a scene of
+/// this size.
+pub(crate) const SHORT_OF_TIME: f64 = 0.3;
+
+/// Shadow rays of a texel in the first pass if time is short: still enough to estimate the error from their spread.
 const LATE_SAMPLES: u32 = 4;
 
 /// The expected variances relative to the squared local light.
@@ -468,7 +480,10 @@ mod tests {
             error_goals(&BakeOptions { error, time: time.map(Duration::from_secs), ..BakeOptions::default() })
         };
         assert_eq!(goals(0.01, None), [0.01]);
-        assert_eq!(goals(0.01, Some(60)), [0.08, 0.04, 0.02, 0.01]);
+        let limited = goals(0.01, Some(60));
+        assert_eq!((limited.len(), limited[6]), (7, 0.01));
+        assert!(limited[0] >= MIN_FIRST_GOAL && limited[1] < MIN_FIRST_GOAL);
+        assert!(limited.is_sorted_by(|coarse, fine| (coarse / fine - GOAL_STEP).abs() < 1e-9));
         assert_eq!(goals(0.5, Some(60)), [0.5], "coarser than any goal");
     }
 }

@@ -12,9 +12,13 @@ use glam::{Vec2, Vec3};
 
 use super::incident::{GatherRequest, Hit, IncidentSample, SamplePath};
 use super::radiance_cache::RadianceCache;
+use crate::BakeError;
+use crate::chunks::in_chunks_until_deadline;
 use crate::coverage::footprint::{Texel, receiver};
 use crate::coverage::tile_sequence::TileSequence;
+use crate::monitor::BakeMonitor;
 use crate::radiosity::patch_index::PatchIndex;
+use crate::sample_allocation::SampleAllocation;
 use crate::sampling::{Sequence, Stream};
 use crate::scene::Receiver;
 use crate::scene::material::Side;
@@ -123,6 +127,31 @@ impl GatherContribution {
 }
 
 impl RadianceCache<'_> {
+    /// Casts the wanted samples. Returns true if there was time for all of them.
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`].
+    pub fn cast(
+        &self,
+        texels: &[Texel],
+        wanted: &[SampleAllocation],
+        gathered: &mut [GatherSums],
+        seed: u32,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<bool, BakeError> {
+        let new_sums = in_chunks_until_deadline(wanted.len(), monitor, |place| {
+            let SampleAllocation { texel, samples } = wanted[place];
+            let mut sums = gathered[texel.place()];
+            self.gather(&texels[texel.place()], &mut sums, samples, seed);
+            sums
+        })?;
+        let in_time = new_sums.len() == wanted.len();
+        for (allocated, sums) in wanted.iter().zip(new_sums) {
+            gathered[allocated.texel.place()] = sums;
+        }
+        Ok(in_time)
+    }
+
     /// Adds the samples `gathered.samples..samples` of every replicate.
     pub fn gather(&self, texel: &Texel, gathered: &mut GatherSums, samples: u32, seed: u32) {
         BATCHES.with_borrow_mut(|batches| self.gather_with(batches, texel, gathered, samples, seed));

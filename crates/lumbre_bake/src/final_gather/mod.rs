@@ -3,6 +3,7 @@
 
 pub(crate) mod error_estimate;
 pub(crate) mod error_ledger;
+pub(crate) mod first_round;
 pub(crate) mod gather;
 pub(crate) mod gather_sums;
 pub(crate) mod incident;

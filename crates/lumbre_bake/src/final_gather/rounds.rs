@@ -7,13 +7,13 @@ use rayon::prelude::*;
 
 use super::error_estimate::{PatchBias, TexelReads, patch_bias};
 use super::error_ledger::{ErrorLedger, GatherErrors, open_sum};
+use super::first_round::{ROUND_PROGRESS, cast_first_round};
 use super::gather_sums::GatherSums;
 use super::learned_guide::learn;
 use super::map_error::MapError;
-use super::patch_fallback::from_patches;
 use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
-use crate::chunks::{decide, in_chunks_until_deadline};
+use crate::chunks::decide;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::Texel;
 use crate::denoise::neighbourhoods::Neighbourhoods;
@@ -28,8 +28,6 @@ use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 
-/// Estimated fraction of the progress of this round and all later ones that a round makes up.
-const ROUND_PROGRESS: f32 = 0.7;
 /// More rays are not worthwhile if the error that they can reduce is less than this fraction of the squared error.
 const MIN_REDUCIBLE: f64 = 0.1;
 /// Fraction of the requested squared error that a round aims at. It is well below 1 because a round's outcome is
@@ -108,10 +106,9 @@ pub(crate) fn gather(
     let wanted = planner.first_samples(&gathered);
     // The previous bake decided that more rays were not needed. If all of it is reused, that still holds.
     let is_all_reused = reused.is_some() && wanted.is_empty();
-    monitor.pass(ROUND_PROGRESS);
     let mut speed = CastSpeed::default();
     let (begun, samples) = (monitor.seconds(), all_samples(&gathered));
-    let mut in_time = cast_first_round(cache, list, wanted, &mut gathered, options, monitor)?;
+    let mut in_time = cast_first_round(cache, texels, wanted, &mut gathered, options, monitor)?;
     speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
     let mut plan: Option<RoundPlan> = None;
     let mut stalled_rounds = 0;
@@ -140,7 +137,7 @@ pub(crate) fn gather(
         let rest = planner.open.iter().map(|texel| reads.rest_in(&gathered[texel.place()])).sum::<f64>();
         reads.add(next.samples(&gathered), rest / planner.count());
         let (begun, samples) = (monitor.seconds(), all_samples(&gathered));
-        in_time = cast(cache, list, &next.wanted, &mut gathered, options, monitor)?;
+        in_time = cache.cast(list, &next.wanted, &mut gathered, options.seed, monitor)?;
         speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
         plan = Some(next);
     };
@@ -383,74 +380,6 @@ impl<'a> RoundPlanner<'a> {
 /// Mean of the channels.
 fn channel_mean(light: Vec3) -> f64 {
     f64::from(light.element_sum()) / 3.0
-}
-
-/// Casts the first round. If there is no time for all of it, texels with no or too few samples are given the light of
-/// their patch. Returns true if there was time.
-fn cast_first_round(
-    cache: &RadianceCache<'_>,
-    texels: &[Texel],
-    mut wanted: Vec<SampleAllocation>,
-    gathered: &mut [GatherSums],
-    options: &BakeOptions,
-    monitor: &mut BakeMonitor<'_>,
-) -> Result<bool, BakeError> {
-    if options.time.is_some() {
-        wanted = limit_to_time(cache, texels, wanted, gathered, options, monitor)?;
-    }
-    let in_time = cast(cache, texels, &wanted, gathered, options, monitor)?;
-    if !in_time {
-        from_patches(cache, texels, gathered);
-    }
-    Ok(in_time)
-}
-
-/// Casts the wanted samples. Returns true if there was time for all of them.
-fn cast(
-    cache: &RadianceCache<'_>,
-    texels: &[Texel],
-    wanted: &[SampleAllocation],
-    gathered: &mut [GatherSums],
-    options: &BakeOptions,
-    monitor: &mut BakeMonitor<'_>,
-) -> Result<bool, BakeError> {
-    let new_sums = in_chunks_until_deadline(wanted.len(), monitor, |place| {
-        let SampleAllocation { texel, samples } = wanted[place];
-        let mut sums = gathered[texel.place()];
-        cache.gather(&texels[texel.place()], &mut sums, samples, options.seed);
-        sums
-    })?;
-    let in_time = new_sums.len() == wanted.len();
-    for (allocated, sums) in wanted.iter().zip(new_sums) {
-        gathered[allocated.texel.place()] = sums;
-    }
-    Ok(in_time)
-}
-
-/// Casts one sample for each wanted texel, and returns as many of the wanted samples as there is time for at that
-/// speed: a few samples in every map are better than all of them in the first maps and none in the last.
-fn limit_to_time(
-    cache: &RadianceCache<'_>,
-    texels: &[Texel],
-    mut wanted: Vec<SampleAllocation>,
-    gathered: &mut [GatherSums],
-    options: &BakeOptions,
-    monitor: &mut BakeMonitor<'_>,
-) -> Result<Vec<SampleAllocation>, BakeError> {
-    let one_each: Vec<SampleAllocation> =
-        wanted.iter().map(|allocated| SampleAllocation { samples: 1, ..*allocated }).collect();
-    let begun = monitor.seconds();
-    if !cast(cache, texels, &one_each, gathered, options, monitor)? {
-        // There was no time even for one each: only texels without any sample are left.
-        wanted.retain(|allocated| gathered[allocated.texel.place()].samples == 0);
-        return Ok(wanted);
-    }
-    let most = wanted.iter().map(|allocated| allocated.samples).max().unwrap_or(1);
-    let affordable = monitor.clock().affordable(1, most, monitor.seconds() - begun);
-    let affordable = decide(monitor, affordable)?;
-    wanted.iter_mut().for_each(|allocated| allocated.samples = allocated.samples.min(affordable));
-    wanted.retain(|allocated| allocated.samples > 1);
-    Ok(wanted)
 }
 
 /// The mean of each texel's replicates, minus the known bias of the patches that its rays read.
