@@ -9,7 +9,7 @@ use super::fingerprints::{bounds, emission, layouts};
 use super::settled;
 use crate::content_hash::{ContentHash, Hashes};
 use crate::coverage::footprint::Texel;
-use crate::final_gather::gather_sums::{GatherSums, Weights};
+use crate::final_gather::gather_sums::{GatherSums, UnguidedLight, Weights};
 use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject};
 use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
@@ -111,11 +111,13 @@ impl Samples {
 }
 
 impl GatherSums {
-    /// The same estimates, as if every sample had had the weight 1; samples that are gathered later add to them.
+    /// The same estimates, as if every sample had had the weight 1; samples that are gathered later add to them. What
+    /// was found beside the guide is forgotten: the next bake has other patches.
     pub fn settled(&self) -> Self {
         let count = self.samples as f32;
         let sums = self.estimates().map(|estimate| estimate * count);
-        Self { sums, weights: sums.map(|sum| Weights::of_equal(sum, self.samples)), rays: 0, ..*self }
+        let weights = sums.map(|sum| Weights::of_equal(sum, self.samples));
+        Self { sums, weights, rays: 0, unguided: UnguidedLight::NONE, ..*self }
     }
 }
 
