@@ -169,24 +169,23 @@ impl<'a> SourceSampler<'a> {
     fn few_samples(
         &self,
         texels: &[CoveredTexel],
+        few: u32,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<Direct>, BakeError> {
-        let [few, ..] = self.options.effort().direct;
         let clock = monitor.clock();
-        let is_time_short = decide(monitor, clock.is_past(SHORT_OF_TIME))?;
         monitor.pass(PASS);
         in_chunks(texels.len(), monitor, |place| {
-            self.light(
-                texels[place],
-                if is_time_short || clock.is_over() { few.min(LATE_SAMPLES) } else { few },
-            )
+            self.light(texels[place], if clock.is_over() { few.min(LATE_SAMPLES) } else { few })
         })
     }
 
     /// Known light, and a few samples of every other texel: a complete map, whatever time it takes.
     fn first_pass(&self, monitor: &mut BakeMonitor<'_>) -> Result<Vec<Direct>, BakeError> {
         let unknown: Vec<CoveredTexel> = self.unknown().collect();
-        let sampled = self.few_samples(&unknown, monitor)?;
+        let [few, ..] = self.options.effort().direct;
+        let is_time_short = decide(monitor, monitor.clock().is_past(SHORT_OF_TIME))?;
+        let few = if is_time_short { few.min(LATE_SAMPLES) } else { few };
+        let sampled = self.few_samples(&unknown, few, monitor)?;
         let mut direct: Vec<Direct> = CoveredTexel::all(self.texels.list.len())
             .map(|texel| known_light(self.known, texel).unwrap_or_default())
             .collect();
@@ -227,7 +226,8 @@ impl<'a> SourceSampler<'a> {
         let blocks: BTreeSet<u32> = lamps.iter().map(|(texel, _)| self.cuts.block(*texel as usize)).collect();
         let changed: Vec<CoveredTexel> =
             self.unknown().filter(|texel| blocks.contains(&self.cuts.block(texel.place()))).collect();
-        for (texel, light) in changed.iter().zip(self.few_samples(&changed, monitor)?) {
+        let [few, ..] = self.options.effort().direct;
+        for (texel, light) in changed.iter().zip(self.few_samples(&changed, few, monitor)?) {
             // What was seen before tells the neighbours that a penumbra is near.
             let Direct { rays, seen, .. } = direct[texel.place()];
             direct[texel.place()] = Direct { rays: rays + light.rays, seen, ..light };

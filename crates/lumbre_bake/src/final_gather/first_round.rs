@@ -2,12 +2,17 @@
 //! no time for one sample of each, one texel of each block of 2 x 2 stands for the others, and what has no time even for
 //! that shows the light of its patch. Later rounds are planned in `rounds`.
 
+use std::f32::consts::FRAC_1_SQRT_2;
+
+use glam::{Vec2, Vec3};
+
 use super::gather_sums::{GatherSums, UnguidedLight};
-use super::patch_fallback::from_patches;
+use super::patch_fallback::{from_patches, knows_nothing};
 use super::radiance_cache::RadianceCache;
 use crate::chunks::decide;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::open_texels;
+use crate::denoise::replicates::{mean, variance};
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::SampleAllocation;
 use crate::texel_index::CoveredTexel;
@@ -20,12 +25,11 @@ const SAMPLES_PER_EVALUATION: f64 = 0.8;
 const BLOCK: u32 = 2;
 /// Estimated fraction of the stage's progress from now on that a round makes up.
 pub(crate) const ROUND_PROGRESS: f32 = 0.7;
-/// Estimated fraction of the stage's progress from now on that a first sample makes up, of one texel of each block or of
-/// the others.
+/// The same for a first sample of one texel of each block, and for that of the others.
 const BLOCKS_PROGRESS: f32 = 0.1;
 
-/// Casts the `wanted` samples, which are the same number for each of their texels, or fewer if there is not the time.
-/// Returns true if there was time for at least one sample of each.
+/// Casts the `wanted` samples, which are the same number for each of their texels, or fewer if time is limited. Returns
+/// false if the time was up before the texels had as many as there seemed to be time for.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -45,47 +49,64 @@ pub(crate) fn cast_first_round(
     }
     // A sample of every texel is better than all samples in the first maps and none in the last; and first of one texel
     // of each block, for the same reason.
-    let begun = monitor.seconds();
     let representatives = representatives(texels);
+    let begun = monitor.seconds();
     let one_each = wanted.iter().map(|allocation| SampleAllocation { samples: 1, ..*allocation });
     let (first, rest): (Vec<_>, Vec<_>) =
         one_each.partition(|allocation| representatives[allocation.texel.place()] == allocation.texel);
-    // How many samples of every wanted texel there is time for, and the evaluation that follows.
+    // How many samples of every wanted texel there is time for, besides the evaluation that follows, which is one of all
+    // texels.
+    let open = open_texels(list).count() as f64;
+    let samples_of_evaluation = SAMPLES_PER_EVALUATION * open / wanted.len() as f64;
     let samples_left = |cast: usize, monitor: &BakeMonitor<'_>| {
         let seconds = (monitor.seconds() - begun).max(1e-6) * wanted.len() as f64 / cast.max(1) as f64;
-        monitor.clock().seconds_left().map_or(f64::INFINITY, |left| left / seconds - SAMPLES_PER_EVALUATION)
+        monitor.clock().seconds_left().map_or(f64::INFINITY, |left| left / seconds - samples_of_evaluation)
     };
     monitor.pass(BLOCKS_PROGRESS);
-    let mut in_time = cache.cast(list, &first, gathered, seed, monitor)?;
-    if in_time {
-        let has_time = samples_left(first.len(), monitor) >= rest.len() as f64 / wanted.len() as f64;
+    if !cache.cast(list, &first, gathered, seed, monitor)? {
+        // Single samples here and there would be dots among the light of patches.
+        from_patches(cache, list, gathered, |sums| sums.samples == 0 || sums.rays > 0);
+        return Ok(false);
+    }
+    let mut in_time = {
+        let needed = rest.len() as f64 / wanted.len() as f64;
+        let has_time = first.is_empty() || samples_left(first.len(), monitor) >= needed;
+        let has_time = decide(monitor, has_time)?;
         monitor.pass(BLOCKS_PROGRESS);
-        in_time = decide(monitor, has_time)? && cache.cast(list, &rest, gathered, seed, monitor)?;
+        has_time && cache.cast(list, &rest, gathered, seed, monitor)?
+    };
+    if in_time {
+        let affordable = (1.0 + samples_left(wanted.len(), monitor).max(0.0)).min(f64::from(most)) as u32;
+        let affordable = decide(monitor, affordable)?;
+        let more = |allocation: &SampleAllocation| SampleAllocation { samples: affordable, ..*allocation };
+        let more: Vec<_> = wanted.iter().filter(|_| affordable > 1).map(more).collect();
+        monitor.pass(ROUND_PROGRESS);
+        in_time = cache.cast(list, &more, gathered, seed, monitor)?;
     }
     if !in_time {
         copy_representatives(&representatives, gathered);
-        from_patches(cache, list, gathered);
-        return Ok(false);
+        from_patches(cache, list, gathered, knows_nothing);
     }
-    let affordable = most.min(1 + samples_left(wanted.len(), monitor).max(0.0) as u32);
-    let affordable = decide(monitor, affordable)?;
-    let more = |allocation: &SampleAllocation| SampleAllocation { samples: affordable, ..*allocation };
-    let more: Vec<_> = wanted.iter().filter(|_| affordable > 1).map(more).collect();
-    monitor.pass(ROUND_PROGRESS);
-    cache.cast(list, &more, gathered, seed, monitor)
+    Ok(in_time)
 }
 
-/// For each texel, the first one of its block if that is open, and of the same chart and group; otherwise the texel
-/// itself.
+/// For each texel, the first one of its block if both are open, of the same chart and not divided by a wall; otherwise
+/// the texel itself.
 fn representatives(texels: &CoveredTexels<'_>) -> Vec<CoveredTexel> {
     let mut places = vec![None; texels.layout.texels];
     for (place, texel) in open_texels(&texels.list) {
         places[texel.index.place()] = Some(place);
     }
+    for texel in &texels.divided {
+        places[texels.list[texel.place()].index.place()] = None;
+    }
     let chart = |place: CoveredTexel| texels.charts[texels.list[place.place()].triangle as usize];
     CoveredTexel::all(texels.list.len())
         .map(|place| {
             let texel = &texels.list[place.place()];
+            if places[texel.index.place()].is_none() {
+                return place;
+            }
             let map = &texels.layout.maps[texel.object as usize];
             let corner = map.texel(texel.x / BLOCK * BLOCK, texel.y / BLOCK * BLOCK);
             places[corner.place()].filter(|&corner| chart(corner) == chart(place)).unwrap_or(place)
@@ -93,13 +114,41 @@ fn representatives(texels: &CoveredTexels<'_>) -> Vec<CoveredTexel> {
         .collect()
 }
 
-/// Gives every texel without samples those of its representative, if that has any.
+/// Gives every texel without samples those of its representative, if that has any. The error that is stated for it
+/// includes the RMS difference between representatives two texels apart, beyond what is noise: no replicate shows by how
+/// much the light differs from one texel to the next.
 fn copy_representatives(representatives: &[CoveredTexel], gathered: &mut [GatherSums]) {
+    let is_sampled = |place: CoveredTexel| gathered[place.place()].rays > 0;
+    let own = CoveredTexel::all(gathered.len()).zip(representatives);
+    let sampled = own.filter(|(place, representative)| place == *representative && is_sampled(*place));
+    let estimates = sampled.map(|(place, _)| (place, gathered[place.place()].estimates()));
+    let (mut squared_differences, mut squared_light) = (0.0, 0.0);
+    let mut before: Option<(CoveredTexel, f64, f64)> = None;
+    for (place, estimates) in estimates {
+        let light = f64::from(mean(&estimates).element_sum()) / 3.0;
+        let noise = f64::from(variance(&estimates).element_sum()) / 3.0;
+        squared_light += light * light - noise;
+        if let Some((_, other, other_noise)) = before.filter(|(other, ..)| other.0 + BLOCK == place.0) {
+            squared_differences += (light - other).powi(2) - noise - other_noise;
+        }
+        before = Some((place, light, noise));
+    }
+    let ratio = squared_differences.max(0.0) / squared_light;
+    let relative_error = if ratio.is_finite() { ratio.min(1.0).sqrt() } else { 1.0 };
     for (place, representative) in CoveredTexel::all(gathered.len()).zip(representatives) {
-        if gathered[place.place()].samples == 0 {
-            let sums = gathered[representative.place()];
-            // They are not cast a second time, and are not the texel's own finds.
-            gathered[place.place()] = GatherSums { rays: 0, unguided: UnguidedLight::NONE, ..sums };
+        let sums = gathered[representative.place()];
+        if gathered[place.place()].samples == 0 && sums.samples > 0 {
+            let difference = (relative_error * f64::from(sums.total())) as f32;
+            // Its rays, checks and discoveries are the representative's, and must not count twice.
+            gathered[place.place()] = GatherSums {
+                patch_errors: sums.patch_errors + Vec2::splat(FRAC_1_SQRT_2 * difference),
+                rays: 0,
+                checks: 0,
+                differences: Vec3::ZERO,
+                squared_differences: 0.0,
+                unguided: UnguidedLight::NONE,
+                ..sums
+            };
         }
     }
 }
@@ -107,16 +156,27 @@ fn copy_representatives(representatives: &[CoveredTexel], gathered: &mut [Gather
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::denoise::replicates::REPLICATES;
+
+    /// Of a texel whose four replicates have one sample each of this light.
+    fn sums(light: f32) -> GatherSums {
+        let unguided = UnguidedLight { light, ..UnguidedLight::NONE };
+        let sums = [Vec3::splat(light); REPLICATES];
+        GatherSums { sums, samples: 1, rays: 4, checks: 1, unguided, ..GatherSums::default() }
+    }
 
     #[test]
     fn a_texel_without_samples_shows_those_of_its_block() {
-        let sums = |samples: u32, rays: u64| GatherSums { samples, rays, ..GatherSums::default() };
-        let mut gathered = vec![sums(1, 4), sums(0, 0), sums(2, 9), sums(0, 0)];
-        let representatives = [0, 0, 0, 3].map(CoveredTexel);
-        copy_representatives(&representatives, &mut gathered);
-        assert_eq!(
-            gathered.iter().map(|sums| (sums.samples, sums.rays)).collect::<Vec<_>>(),
-            [(1, 4), (1, 0), (2, 9), (0, 0)]
-        );
+        let none = GatherSums::default();
+        let mut gathered = vec![sums(3.0), none, sums(5.0), none, none];
+        copy_representatives(&[0, 0, 2, 2, 4].map(CoveredTexel), &mut gathered);
+        let shown: Vec<_> =
+            gathered.iter().map(|sums| (sums.estimates()[0].x, sums.rays, sums.checks)).collect();
+        assert_eq!(shown, [(3.0, 4, 1), (3.0, 0, 0), (5.0, 4, 1), (5.0, 0, 0), (0.0, 0, 0)]);
+        assert_eq!(gathered[1].unguided.light, 0.0, "not found by this texel");
+        // The two representatives differ by 2, where the root of the sum of squares is √34.
+        let relative = f64::from(gathered[1].patch_error().length()) / 3.0;
+        assert!((relative - 2.0 / 34f64.sqrt()).abs() < 1e-6, "{relative}");
+        assert_eq!(gathered[0].patch_error(), Vec2::ZERO);
     }
 }

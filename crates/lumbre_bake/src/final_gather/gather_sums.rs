@@ -72,6 +72,7 @@ pub(crate) struct GatherSums {
     pub samples: u32,
     /// Rays cast.
     pub rays: u64,
+    /// Of the samples since the guide last learned.
     pub unguided: UnguidedLight,
 }
 

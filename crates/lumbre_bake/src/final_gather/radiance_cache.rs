@@ -13,7 +13,7 @@ use crate::direct_light::DirectLight;
 use crate::monitor::BakeMonitor;
 use crate::radiosity::exchange::Exchange;
 use crate::radiosity::patches::Patches;
-use crate::radiosity::sampling_guide::SamplingGuide;
+use crate::radiosity::sampling_guide::{Discovery, SamplingGuide};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
 use crate::sources::light_sources::Sources;
@@ -42,8 +42,11 @@ pub(crate) struct RadianceCache<'a> {
     pub min_read_distance: &'a [f32],
     /// Radius on a surface within which the errors that rounds leave in texels are correlated, canonical units.
     pub correlation_radius: f32,
-    /// Which regions the light of each region comes from.
+    /// Which regions the light of each region comes from: as the patches know it, and with all `discoveries`.
     pub guide: Cow<'a, SamplingGuide>,
+    pub guide_of_patches: &'a SamplingGuide,
+    /// What the rounds have found so far that the patches' guide had missed.
+    pub discoveries: Vec<Discovery>,
     /// Samples of each replicate in the first round.
     pub first_round_samples: u32,
 }
@@ -88,6 +91,8 @@ impl<'a> RadianceCache<'a> {
             patch_error: &exchange.indirect_error,
             min_read_distance: &exchange.near,
             guide: Cow::Borrowed(&exchange.guide),
+            guide_of_patches: &exchange.guide,
+            discoveries: Vec::new(),
             first_round_samples: effort.gather[0] / REPLICATES as u32,
         })
     }

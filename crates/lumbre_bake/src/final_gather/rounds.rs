@@ -147,7 +147,7 @@ pub(crate) fn gather(
     })?;
     report.leaked_rays = cache.scene.leaks.count() - leaked_before;
     report.rays += gathered.iter().map(|sums| sums.rays).sum::<u64>();
-    // Texels for which there was no time have no rays: their sums are the light of their patch.
+    // Texels for which there was no time have no rays: their sums are those of a neighbour, or the light of their patch.
     let cast = gathered.iter().filter(|sums| sums.rays > 0);
     let cast: u64 = cast.map(|sums| u64::from(sums.samples) * REPLICATES as u64).sum();
     report.gather_rays = cast as f64 / planner.open.len().max(1) as f64;

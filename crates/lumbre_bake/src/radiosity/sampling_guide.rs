@@ -41,7 +41,7 @@ pub(crate) struct Discovery {
     pub receiver: Region,
     /// Where it comes from.
     pub patch: PatchIndex,
-    /// Its share of all light by bounces that the region receives.
+    /// Its share of all light by bounces and by the sky that the region receives.
     pub share: f64,
 }
 
@@ -80,6 +80,9 @@ const SHARE_STEPS: f32 = 8.0;
 /// Most of a region's distribution that discoveries make up together: one sample says little about how much light comes
 /// that way.
 const MAX_DISCOVERED: f64 = 0.5;
+
+/// So many regions may be added to any row.
+const MIN_NEW_ENTRIES: usize = 8;
 
 /// Patches along a region's side.
 const REGION_SIDE: f32 = 4.0;
@@ -184,9 +187,11 @@ impl SamplingGuide {
     }
 
     /// The guide with `discoveries`, which are sorted by their receivers. Half of what is discovered counts for the region
-    /// that it came from, the other half for all bright regions around that one.
+    /// that it came from, the other half for all bright regions around that one. No row more than doubles, or gets more
+    /// than [`MIN_NEW_ENTRIES`] if it was short, so that memory still follows from the rays of the form factors.
     pub fn with(&self, discoveries: &[Discovery]) -> Self {
         let mut rows = Rows { part_bits: self.rows.part_bits, ..Rows::default() };
+        rows.entries.reserve(self.rows.entries.len());
         let mut left = discoveries;
         for number in 0..self.rows.heads.len() as u32 {
             let discovered;
@@ -203,10 +208,16 @@ impl SamplingGuide {
                 true => (rounded_share(total.min(1.0)).max(1.0 / SHARE_STEPS), total),
                 false => (share, total.min(MAX_DISCOVERED)),
             };
-            let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
+            let mut new: BTreeMap<u32, f64> = BTreeMap::new();
             for (region, share) in discovered.iter().flat_map(|discovery| self.spread(discovery)) {
-                *weights.entry(region).or_default() += weight * share / total;
+                *new.entry(region).or_default() += share;
             }
+            let mut new: Vec<(u32, f64)> = new.into_iter().collect();
+            new.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+            new.truncate(known.len().max(MIN_NEW_ENTRIES));
+            let total = new.iter().map(|(_, share)| share).sum::<f64>();
+            let mut weights: BTreeMap<u32, f64> =
+                new.into_iter().map(|(region, share)| (region, weight * share / total)).collect();
             let mut start = 0.0;
             for entry in known {
                 *weights.entry(entry.column).or_default() += (1.0 - weight) * f64::from(entry.end - start);
@@ -214,7 +225,13 @@ impl SamplingGuide {
             }
             rows.push(share, &cumulative(weights.into_iter().collect()));
         }
-        Self { rows, ..self.clone() }
+        Self {
+            rows,
+            members: self.members.clone(),
+            first_members: self.first_members.clone(),
+            patches: self.patches.clone(),
+            unseen: self.unseen.clone(),
+        }
     }
 
     /// The regions to which a discovery leads, with their parts of its share.

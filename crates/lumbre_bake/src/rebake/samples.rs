@@ -112,7 +112,7 @@ impl Samples {
 
 impl GatherSums {
     /// The same estimates, as if every sample had had the weight 1; samples that are gathered later add to them. What
-    /// was found beside the guide is forgotten: the next bake has other patches.
+    /// the guide had missed is forgotten: the next bake has other patches.
     pub fn settled(&self) -> Self {
         let count = self.samples as f32;
         let sums = self.estimates().map(|estimate| estimate * count);
