@@ -168,8 +168,9 @@ pub(crate) struct Effort {
     pub shared: [u32; 2],
     /// Gather rays per texel: in the first round, and at most.
     pub gather: [u32; 2],
-    /// Limit for a bake's total, whatever error was requested (not of a final bake whose time is limited): most gather rays, and most samples of the sources that
-    /// share them, per texel on average. The total may always be as large as [`SMALL_BUDGET`].
+    /// Limit for a bake's total, whatever error was requested (not of a final bake whose time is limited): most gather
+    /// rays, and most samples of the sources that share them, per texel on average. The total may always be as large as
+    /// [`SMALL_BUDGET`].
     pub mean: u32,
 }
 

@@ -2,8 +2,8 @@
 //! shadow rays everywhere; many where the first pass saw a source partly, or saw other sources than a texel nearby,
 //! unless its result was exact (so the faint ends of a penumbra are found from their neighbours); then more where the
 //! requested error is not yet in reach. Under a time limit the later passes are made for one error after the other, from a
-//! coarse one to the requested one. Sources that do not matter by themselves share samples: that is `shared_light`. So do lamps where nearly everything
-//! lies in their penumbrae.
+//! coarse one to the requested one. Sources that do not matter by themselves share samples: that is `shared_light`. So do
+//! lamps where nearly everything lies in their penumbrae.
 
 pub(crate) mod light_cuts;
 pub(crate) mod light_visibility;
@@ -438,7 +438,7 @@ const PASS_OF_LOCAL_LIGHT: f32 = 0.2;
 /// this size.
 pub(crate) const SHORT_OF_TIME: f64 = 0.3;
 
-/// Shadow rays of a texel in the first pass if time is short: still enough to estimate the error from their spread.
+/// Shadow rays of a texel in the first pass if time is short or over: still enough to estimate the error from their spread.
 const LATE_SAMPLES: u32 = 4;
 
 /// The expected variances relative to the squared local light.

@@ -99,10 +99,6 @@ struct GatherContribution {
     texel_variance: f32,
     /// Whether the light of a texel was read, not that of a patch.
     reads_texel: bool,
-    /// The patch that was hit.
-    patch: PatchIndex,
-    /// Whether the guide would hardly have led there.
-    is_unguided: bool,
     /// Whether the patch that was read is checked against a real bounce.
     is_checked: bool,
     /// By how much the patch gives more light than the real bounce; before the check has run, the weight of that.
@@ -118,8 +114,6 @@ impl GatherContribution {
         error: Vec2::ZERO,
         texel_variance: 0.0,
         reads_texel: false,
-        patch: PatchIndex(0),
-        is_unguided: false,
         is_checked: false,
         difference: Vec3::ZERO,
         rays: 0,
@@ -208,8 +202,6 @@ impl RadianceCache<'_> {
                 ..GatherContribution::NONE
             };
             let Some(hit) = &mut incident.hit else { continue };
-            contribution.patch = hit.patch;
-            contribution.is_unguided = samples.paths[slot].cosine_share() * incident.weight > UNGUIDED;
             if hit.is_steep {
                 let sequence = Sequence::new(seed, Stream::SteepLight(replicate as u32), texel.index.0);
                 let (direct, rays) = self.direct_light_at(hit, sequence.of(sample));
@@ -238,7 +230,7 @@ impl RadianceCache<'_> {
             contributions[slot].rays += 1;
             contributions[slot].difference *= self.patch_indirect[patch.place()] - real_bounce;
         }
-        for (contribution, &(replicate, _)) in contributions.iter().zip(tags) {
+        for (slot, (contribution, &(replicate, _))) in contributions.iter().zip(tags).enumerate() {
             gathered.sums[replicate] += contribution.light;
             gathered.weights[replicate].add(contribution.weight, contribution.light);
             gathered.rays += 1 + u64::from(contribution.rays);
@@ -249,8 +241,11 @@ impl RadianceCache<'_> {
             gathered.differences += contribution.difference;
             gathered.squared_differences += (contribution.difference.element_sum() / 3.0).powi(2);
             let light = contribution.light.element_sum() / 3.0;
-            if contribution.is_unguided && light > gathered.unguided.light {
-                gathered.unguided = UnguidedLight { patch: contribution.patch, light };
+            if let Some(hit) = &samples.results[slot].hit
+                && light > gathered.unguided.light
+                && samples.paths[slot].cosine_share() * contribution.weight > UNGUIDED
+            {
+                gathered.unguided = UnguidedLight { patch: hit.patch, light };
             }
         }
         samples.count = 0;

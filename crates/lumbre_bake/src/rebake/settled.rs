@@ -1,6 +1,6 @@
 //! How the gathered light of a finished bake is serialized: without the weights, which follow from the other fields
-//! once samples are settled ([`GatherSums::settled`]), without the number of rays, and without what the guide had missed, as
-//! the next bake has another guide.
+//! once samples are settled ([`GatherSums::settled`]), without the number of rays, and without what the guide had
+//! missed, as the next bake has another guide.
 
 use glam::Vec3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};

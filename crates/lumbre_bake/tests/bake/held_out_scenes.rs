@@ -1,6 +1,6 @@
 //! Bakes of scenes that no constant was tuned on, without texture coordinates, against the tests' own path tracer: two
-//! rooms joined by a doorway with a lamp in one of them, a hall with columns, and a room whose lamp is behind a grille. The density is low enough for a test;
-//! the examples `held_out_scenes`, `bake_file` and `judge` do the same at any density.
+//! rooms joined by a doorway with a lamp in one of them, a hall with columns, and a room whose lamp is behind a grille.
+//! The density is low enough for a test; the examples `held_out_scenes`, `bake_file` and `judge` do the same at any density.
 
 #![allow(clippy::print_stdout, reason = "the errors are the result that a reader of the output wants")]
 
