@@ -52,6 +52,8 @@ modules!(
     "refraction",
     "shadow_caster",
     "shadows",
+    "shared_records",
+    "shared_records_probe",
     "surface_maps",
     "tone_curve",
     "optics/ambient_cube",

@@ -173,6 +173,7 @@ mod tests {
     use lumbre_optics::{ReflectionModel, Shading};
 
     use super::*;
+    use crate::shader::TableAccess;
     use lumbre_shaders::to_wgsl;
 
     #[test]
@@ -200,7 +201,7 @@ mod tests {
                     let mut variant = Variant::new(*shading, ReflectionModel::Blinn);
                     features.iter().for_each(|feature| variant.set(*feature, true));
                     let variant = variant.reduced();
-                    let source = to_wgsl("forward", &variant.flags(false)).unwrap();
+                    let source = to_wgsl("forward", &variant.flags(TableAccess::default())).unwrap();
                     let module = naga::front::wgsl::parse_str(&source).unwrap();
                     let read: Vec<u32> = module
                         .global_variables

@@ -1,7 +1,7 @@
 //! The wgpu device and what it was created from. Surfaces are created in `window_surface`.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use bevy_ecs::resource::Resource;
 
@@ -23,6 +23,8 @@ pub struct Gpu {
     lost: Arc<AtomicBool>,
     fault: Arc<Mutex<Option<String>>>,
     worker_thread: Arc<WorkerThread>,
+    /// Whether fragments can load records for each other, once `shared_records` has found out.
+    shares_records: Arc<OnceLock<bool>>,
 }
 
 /// A field of `wgpu::Limits`: its name, how to read it, and the least value that is sufficient.
@@ -48,14 +50,16 @@ const MIN_LIMITS: [LeastLimit; 4] = [
 
 impl Gpu {
     /// Features that are used if a device has them; none is required. They are queries for measurements,
-    /// shaders that count lights ([`Measure::Lights`](crate::Measure)), and blending and multisampling of
-    /// 32-bit floats for frames with full precision.
+    /// shaders that count lights ([`Measure::Lights`](crate::Measure)), subgroups in which the fragments of a
+    /// software rasterizer load lights for each other, and blending and multisampling of 32-bit floats for
+    /// frames with full precision.
     pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
         .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
         .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES)
         .union(wgpu::Features::PIPELINE_STATISTICS_QUERY)
         .union(wgpu::Features::VERTEX_WRITABLE_STORAGE)
         .union(wgpu::Features::SHADER_EARLY_DEPTH_TEST)
+        .union(wgpu::Features::SUBGROUP)
         .union(wgpu::Features::FLOAT32_BLENDABLE)
         .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
 
@@ -82,8 +86,8 @@ impl Gpu {
                 return Err(RenderError::DeviceTooSmall { limit, least, found });
             }
         }
-        let (lost, fault, worker_thread) = Default::default();
-        let gpu = Self { instance, adapter, device, queue, lost, fault, worker_thread };
+        let (lost, fault, worker_thread, shares_records) = Default::default();
+        let gpu = Self { instance, adapter, device, queue, lost, fault, worker_thread, shares_records };
         let noted = gpu.notes();
         gpu.device.set_device_lost_callback(move |reason, message| {
             tracing::warn!("the GPU device is lost ({reason:?}): {message}");
@@ -196,6 +200,11 @@ impl Gpu {
     /// Returns true if the shaders of lit surfaces read tables from textures instead of storage buffers.
     pub(crate) fn reads_tables_from_textures(&self) -> bool {
         self.is_software()
+    }
+
+    /// Whether fragments can load records for each other; see `shared_records`.
+    pub(crate) fn shares_records(&self) -> &OnceLock<bool> {
+        &self.shares_records
     }
 
     /// The thread that creates pipelines which no frame waits for.

@@ -83,6 +83,7 @@ mod shading_by_need;
 mod shading_need;
 mod shadow_light;
 mod shadows;
+mod shared_records;
 mod stage_clock;
 mod statistics;
 mod table_texture;

@@ -12,8 +12,9 @@ use crate::g_buffer;
 use crate::irradiance_volumes;
 use crate::mesh_buffers::Attribute;
 use crate::pending::Pending;
-use crate::shader::{self, Feature, Variant};
+use crate::shader::{self, Feature, TableAccess, Variant};
 use crate::shadows;
+use crate::shared_records::can_share_records;
 use crate::target::DEPTH_FORMAT;
 use crate::texture_sets::TextureSets;
 use crate::{Gpu, RenderError};
@@ -128,9 +129,12 @@ impl Pipelines {
             let shadows = key.variant.has(Feature::Shadows).then(|| self.shadow_layout.clone());
             let groups = [Some(frame), textures, baked_light, shadows];
             let (device, modules) = (gpu.device.clone(), Arc::clone(&self.modules));
-            let tables_in_textures = gpu.reads_tables_from_textures();
+            let tables = TableAccess {
+                in_textures: gpu.reads_tables_from_textures(),
+                shared: key.variant.shares_records() && can_share_records(gpu),
+            };
             let afterwards = if wait { None } else { afterwards() };
-            let make = move || match make(&device, &modules, &groups, key, tables_in_textures) {
+            let make = move || match make(&device, &modules, &groups, key, tables) {
                 Ok(pipeline) => {
                     afterwards.into_iter().for_each(|afterwards| afterwards());
                     Ok(pipeline)
@@ -200,9 +204,9 @@ fn make(
     modules: &Modules,
     groups: &[Option<wgpu::BindGroupLayout>; 4],
     key: PipelineKey,
-    tables_in_textures: bool,
+    tables: TableAccess,
 ) -> Result<Pipeline, RenderError> {
-    let module = &module(device, modules, key.variant, tables_in_textures)?;
+    let module = &module(device, modules, key.variant, tables)?;
     let groups = groups.each_ref().map(Option::as_ref);
     let used = groups.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
     let attributes = attributes(&key.variant);
@@ -286,13 +290,13 @@ fn module(
     device: &wgpu::Device,
     modules: &Modules,
     variant: Variant,
-    tables_in_textures: bool,
+    tables: TableAccess,
 ) -> Result<wgpu::ShaderModule, RenderError> {
     let known = modules.lock().ok().and_then(|modules| modules.get(&variant).cloned());
     if let Some(known) = known {
         return Ok(known);
     }
-    let module = shader::compile(device, variant.module(), &variant.flags(tables_in_textures))?;
+    let module = shader::compile(device, variant.module(), &variant.flags(tables))?;
     if let Ok(mut modules) = modules.lock() {
         modules.insert(variant, module.clone());
     }

@@ -43,11 +43,24 @@ mod tests {
     use lumbre_optics::{ReflectionModel, Shading};
 
     use super::{tested_early, to_wgsl};
-    use crate::shader::{Feature, Variant};
+    use crate::shader::{Feature, TableAccess, Variant};
 
-    /// Returns the WGSL of a variant, after naga has validated it.
+    /// Returns the WGSL of a variant for a device with storage buffers, after naga has validated it, and what
+    /// a software rasterizer compiles.
     fn valid(variant: &Variant) -> Arc<str> {
-        let mut source = to_wgsl("forward", &variant.flags(false)).unwrap();
+        let shared = valid_with(variant, TableAccess { in_textures: true, shared: true });
+        let shares = variant.has(Feature::Lights)
+            && variant.shading == Shading::Phong
+            && !variant.has(Feature::CountLights)
+            && !variant.has(Feature::GBuffer);
+        assert_eq!(shared.contains("subgroup"), shares, "{variant}:\n{shared}");
+        let plain = valid_with(variant, TableAccess::default());
+        assert!(!plain.contains("subgroup"), "{variant}:\n{plain}");
+        plain
+    }
+
+    fn valid_with(variant: &Variant, tables: TableAccess) -> Arc<str> {
+        let mut source = to_wgsl("forward", &variant.flags(tables)).unwrap();
         if variant.has(Feature::CountLights) {
             source = tested_early(&source).into();
             assert_eq!(source.matches("@early_depth_test(force) @fragment").count(), 1, "{source}");
@@ -58,6 +71,7 @@ mod tests {
         };
         let mut capabilities = naga::valid::Capabilities::default();
         capabilities.set(naga::valid::Capabilities::EARLY_DEPTH_TEST, source.contains("@early_depth_test"));
+        capabilities.set(naga::valid::Capabilities::SUBGROUP, tables.shared);
         let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
         if let Err(error) = validator.validate(&module) {
             panic!("{variant}: {}", error.emit_to_string(&source));

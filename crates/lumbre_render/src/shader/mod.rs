@@ -5,5 +5,5 @@ mod compile;
 mod variant;
 
 pub(crate) use compile::compile;
-pub(crate) use variant::TABLES_IN_TEXTURES;
 pub use variant::{DisplayVariant, Feature, Variant};
+pub(crate) use variant::{TABLES_IN_TEXTURES, TableAccess};

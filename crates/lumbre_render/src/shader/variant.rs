@@ -151,6 +151,18 @@ features! {
 /// The feature flag of shaders that read the tables of a frame: whether the tables are textures.
 pub(crate) const TABLES_IN_TEXTURES: &str = "TABLES_IN_TEXTURES";
 
+/// The feature flag of lit shaders whose fragments load records for each other.
+const SUBGROUPS_OF_8: &str = "SUBGROUPS_OF_8";
+
+/// How the lit shaders of a device read tables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct TableAccess {
+    /// Tables are textures instead of storage buffers.
+    pub in_textures: bool,
+    /// Fragments can load records for each other.
+    pub shared: bool,
+}
+
 /// Features that are decided by the frame, its lights and their lists, not by a material alone.
 const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::IrradianceVolume as u64
@@ -355,9 +367,18 @@ impl Variant {
         self
     }
 
-    /// Returns the shader's feature flags on a device that keeps tables in textures or in buffers: each name,
-    /// and whether it is on.
-    pub(crate) fn flags(&self, tables_in_textures: bool) -> Vec<(&'static str, bool)> {
+    /// Returns true if its fragments load records for each other on a device that can do that. Fragments that
+    /// count lights do not: each counts those of its own lists.
+    pub(crate) fn shares_records(&self) -> bool {
+        self.shading == Shading::Phong
+            && self.has(Feature::Lights)
+            && !self.has(Feature::CountLights)
+            && !self.has(Feature::GBuffer)
+    }
+
+    /// Returns the shader's feature flags on a device that reads tables this way: each name, and whether it
+    /// is on.
+    pub(crate) fn flags(&self, tables: TableAccess) -> Vec<(&'static str, bool)> {
         let features = Feature::ALL.iter().map(|feature| (feature.name(), self.has(*feature)));
         let shading = [
             ("SHADING_FLAT", Shading::Flat),
@@ -373,7 +394,8 @@ impl Variant {
         ];
         features
             // Ambient lights are summed before the frame, so no shader handles them.
-            .chain([("AMBIENT_LIGHTS", false), (TABLES_IN_TEXTURES, tables_in_textures)])
+            .chain([("AMBIENT_LIGHTS", false), (TABLES_IN_TEXTURES, tables.in_textures)])
+            .chain([(SUBGROUPS_OF_8, tables.shared && self.shares_records())])
             .chain(shading.map(|(name, value)| (name, value == self.shading)))
             .chain(reflection.map(|(name, value)| (name, value == self.reflection)))
             .collect()
@@ -383,7 +405,7 @@ impl Variant {
 impl std::fmt::Display for Variant {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut separator = "";
-        for (name, on) in self.flags(false) {
+        for (name, on) in self.flags(TableAccess::default()) {
             if on {
                 write!(formatter, "{separator}{name}")?;
                 separator = " ";

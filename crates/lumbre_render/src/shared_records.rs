@@ -1,0 +1,124 @@
+//! Whether the fragments of a subgroup can load records for each other on a device, as
+//! shaders/shared_records.wesl does. That needs lanes which all run, also those whose fragment is not covered
+//! or has been discarded. No specification promises this, so a small triangle is drawn once to find out.
+
+use crate::table_texture::TableTexture;
+use crate::{Gpu, Offscreen, OffscreenFormat, RenderError, shader};
+
+/// Lanes of a subgroup.
+const LANES: u32 = 8;
+/// Side of the picture in which the triangle is drawn, in pixels.
+const SIDE: u32 = 16;
+/// What a pixel has where nothing was drawn.
+const NOTHING: u8 = 128;
+/// What it has where the numbers of all lanes arrived, instead of 0.
+const ARRIVED: u8 = 255;
+
+/// Returns true if they can, which is found out once per device. Only software rasterizers are asked: a GPU
+/// loads a record that all of its fragments need only once anyway.
+pub(crate) fn can_share_records(gpu: &Gpu) -> bool {
+    *gpu.shares_records().get_or_init(|| find_out(gpu))
+}
+
+fn find_out(gpu: &Gpu) -> bool {
+    let info = gpu.adapter.get_info();
+    let eight = [info.subgroup_min_size, info.subgroup_max_size] == [LANES; 2];
+    if !gpu.is_software() || !eight || !gpu.device.features().contains(wgpu::Features::SUBGROUP) {
+        return false;
+    }
+    match probe(gpu) {
+        Ok(pixels) => {
+            let value = |pixel: &[u8]| pixel.first().copied();
+            let known = |value: Option<u8>| value == Some(NOTHING) || value == Some(ARRIVED);
+            let arrived = pixels.chunks_exact(4).any(|pixel| value(pixel) == Some(ARRIVED));
+            arrived && pixels.chunks_exact(4).all(|pixel| known(value(pixel)))
+        }
+        Err(error) => {
+            tracing::warn!("fragments load their records separately: {error}");
+            false
+        }
+    }
+}
+
+/// Draws the triangle and returns its picture.
+fn probe(gpu: &Gpu) -> Result<Vec<u8>, RenderError> {
+    const LABEL: &str = "lanes of a subgroup";
+    let device = &gpu.device;
+    let module = shader::compile(device, "shared_records_probe", &[])?;
+    let numbers: [u32; LANES as usize] = std::array::from_fn(|lane| 3u32.pow(lane as u32));
+    let entry_size = size_of::<u32>();
+    let mut table = TableTexture::new();
+    table.make_room(gpu, LABEL, (numbers.len(), entry_size))?;
+    table.write(gpu, bytemuck::cast_slice(&numbers), entry_size, 0..numbers.len());
+    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(LABEL),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: Default::default(),
+        depth_stencil: None,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &[Some(OffscreenFormat::Rgba8.texture_format().into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    });
+    let view = table
+        .view()
+        .map(|view| wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) });
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some(LABEL),
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: view.as_slice(),
+    });
+    let picture = Offscreen::new(gpu, SIDE, SIDE, OffscreenFormat::Rgba8)?;
+    let gray = f64::from(NOTHING) / 255.0;
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(LABEL),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: &picture.target().view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color { r: gray, g: gray, b: gray, a: 1.0 }),
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        ..Default::default()
+    });
+    pass.set_pipeline(&pipeline);
+    pass.set_bind_group(0, &group, &[]);
+    pass.draw(0..3, 0..1);
+    drop(pass);
+    gpu.queue.submit([encoder.finish()]);
+    picture.read_rgba8(gpu)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_triangle_is_drawn_and_partly_discarded() {
+        let gpu = Gpu::headless().unwrap();
+        if !gpu.device.features().contains(wgpu::Features::SUBGROUP) {
+            eprintln!("SKIPPED: {} has no subgroups", gpu.describe());
+            return;
+        }
+        let picture = probe(&gpu).unwrap();
+        let count = |value| picture.chunks_exact(4).filter(|pixel| pixel[0] == value).count();
+        let [nothing, missing, arrived] = [NOTHING, 0, ARRIVED].map(count);
+        assert_eq!(nothing + missing + arrived, (SIDE * SIDE) as usize);
+        assert!(nothing > 100 && missing + arrived > 50, "{nothing} {missing} {arrived}");
+        assert_eq!(can_share_records(&gpu), missing == 0 && gpu.is_software());
+    }
+}
