@@ -24,7 +24,7 @@ pub struct Gpu {
     fault: Arc<Mutex<Option<String>>>,
     worker_thread: Arc<WorkerThread>,
     /// Whether fragments can load records for each other, once `shared_records` has found out.
-    shares_records: Arc<OnceLock<bool>>,
+    record_sharing: Arc<OnceLock<bool>>,
 }
 
 /// A field of `wgpu::Limits`: its name, how to read it, and the least value that is sufficient.
@@ -86,8 +86,8 @@ impl Gpu {
                 return Err(RenderError::DeviceTooSmall { limit, least, found });
             }
         }
-        let (lost, fault, worker_thread, shares_records) = Default::default();
-        let gpu = Self { instance, adapter, device, queue, lost, fault, worker_thread, shares_records };
+        let (lost, fault, worker_thread, record_sharing) = Default::default();
+        let gpu = Self { instance, adapter, device, queue, lost, fault, worker_thread, record_sharing };
         let noted = gpu.notes();
         gpu.device.set_device_lost_callback(move |reason, message| {
             tracing::warn!("the GPU device is lost ({reason:?}): {message}");
@@ -153,7 +153,8 @@ impl Gpu {
         surface: Option<&wgpu::Surface<'_>>,
     ) -> Result<Self, RenderError> {
         let adapter = find_adapter(&instance, surface)?;
-        Self::from_adapter(instance, adapter)
+        let features = useful_features(&adapter);
+        Self::from_adapter(instance, adapter, features)
     }
 
     /// Returns true if several devices of the adapter can work at the same time. Devices of OpenGL take
@@ -162,25 +163,20 @@ impl Gpu {
         self.adapter.get_info().backend != wgpu::Backend::Gl
     }
 
-    /// Opens another device of the same adapter.
+    /// Opens another device of the same adapter, with the same features.
     ///
     /// # Errors
     /// [`RenderError::Device`], [`RenderError::DeviceTooSmall`].
     pub fn another(&self) -> Result<Self, RenderError> {
-        Self::from_adapter(self.instance.clone(), self.adapter.clone())
+        Self::from_adapter(self.instance.clone(), self.adapter.clone(), self.device.features())
     }
 
-    /// Opens a device of a given adapter.
+    /// Opens a device of a given adapter with these features.
     pub(crate) fn from_adapter(
         instance: wgpu::Instance,
         adapter: wgpu::Adapter,
+        features: wgpu::Features,
     ) -> Result<Self, RenderError> {
-        let mut features = adapter.features() & Self::OPTIONAL_FEATURES;
-        if adapter.get_info().device_type == wgpu::DeviceType::Cpu {
-            // A software rasterizer draws a render pass tile by tile, so a timestamp within it would cover
-            // the last tile only.
-            features.remove(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
-        }
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("lumbre"),
             required_features: features,
@@ -203,8 +199,8 @@ impl Gpu {
     }
 
     /// Whether fragments can load records for each other; see `shared_records`.
-    pub(crate) fn shares_records(&self) -> &OnceLock<bool> {
-        &self.shares_records
+    pub(crate) fn record_sharing(&self) -> &OnceLock<bool> {
+        &self.record_sharing
     }
 
     /// The thread that creates pipelines which no frame waits for.
@@ -252,6 +248,17 @@ impl Notes {
         if let Ok(mut first) = self.fault.lock() {
             first.get_or_insert_with(|| error.to_string());
         }
+    }
+}
+
+/// Returns the features of an adapter that a device is opened with.
+fn useful_features(adapter: &wgpu::Adapter) -> wgpu::Features {
+    let features = adapter.features() & Gpu::OPTIONAL_FEATURES;
+    // A software rasterizer draws a render pass tile by tile, so a timestamp within it would cover the last
+    // tile only. Only a software rasterizer gains by subgroups.
+    match adapter.get_info().device_type {
+        wgpu::DeviceType::Cpu => features - wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES,
+        _ => features - wgpu::Features::SUBGROUP,
     }
 }
 

@@ -50,6 +50,7 @@ pub(crate) struct Pipelines {
     shadow_layout: wgpu::BindGroupLayout,
     volume_layout: wgpu::BindGroupLayout,
     g_buffer_layout: wgpu::BindGroupLayout,
+    tables: TableAccess,
     modules: Modules,
     pipelines: HashMap<PipelineKey, Pending<Pipeline>>,
 }
@@ -67,6 +68,10 @@ impl Pipelines {
             shadow_layout: shadows::receiver_layout(gpu),
             volume_layout: irradiance_volumes::layout(gpu),
             g_buffer_layout: g_buffer::layout(gpu),
+            tables: TableAccess {
+                in_textures: gpu.reads_tables_from_textures(),
+                shared: can_share_records(gpu),
+            },
             modules: Modules::default(),
             pipelines: HashMap::new(),
         }
@@ -129,10 +134,7 @@ impl Pipelines {
             let shadows = key.variant.has(Feature::Shadows).then(|| self.shadow_layout.clone());
             let groups = [Some(frame), textures, baked_light, shadows];
             let (device, modules) = (gpu.device.clone(), Arc::clone(&self.modules));
-            let tables = TableAccess {
-                in_textures: gpu.reads_tables_from_textures(),
-                shared: key.variant.shares_records() && can_share_records(gpu),
-            };
+            let tables = self.tables;
             let afterwards = if wait { None } else { afterwards() };
             let make = move || match make(&device, &modules, &groups, key, tables) {
                 Ok(pipeline) => {

@@ -2,6 +2,7 @@
 //! shaders/shared_records.wesl does. That needs lanes which all run, also those whose fragment is not covered
 //! or has been discarded. No specification promises this, so a small triangle is drawn once to find out.
 
+use crate::growable_buffer::GrowableBuffer;
 use crate::table_texture::TableTexture;
 use crate::{Gpu, Offscreen, OffscreenFormat, RenderError, shader};
 
@@ -14,16 +15,15 @@ const NOTHING: u8 = 128;
 /// What it has where the numbers of all lanes arrived, instead of 0.
 const ARRIVED: u8 = 255;
 
-/// Returns true if they can, which is found out once per device. Only software rasterizers are asked: a GPU
-/// loads a record that all of its fragments need only once anyway.
+/// Returns true if the fragments of a subgroup can load records for each other on this device. This is found
+/// out once per device, and only for software rasterizers: where all fragments of a subgroup need the same
+/// record, a GPU loads it once by itself.
 pub(crate) fn can_share_records(gpu: &Gpu) -> bool {
-    *gpu.shares_records().get_or_init(|| find_out(gpu))
+    *gpu.record_sharing().get_or_init(|| find_out(gpu))
 }
 
 fn find_out(gpu: &Gpu) -> bool {
-    let info = gpu.adapter.get_info();
-    let eight = [info.subgroup_min_size, info.subgroup_max_size] == [LANES; 2];
-    if !gpu.is_software() || !eight || !gpu.device.features().contains(wgpu::Features::SUBGROUP) {
+    if !gpu.is_software() || !has_subgroups_of_8(gpu) {
         return false;
     }
     match probe(gpu) {
@@ -40,11 +40,18 @@ fn find_out(gpu: &Gpu) -> bool {
     }
 }
 
+fn has_subgroups_of_8(gpu: &Gpu) -> bool {
+    let info = gpu.adapter.get_info();
+    let eight = [info.subgroup_min_size, info.subgroup_max_size] == [LANES; 2];
+    eight && gpu.device.features().contains(wgpu::Features::SUBGROUP)
+}
+
 /// Draws the triangle and returns its picture.
 fn probe(gpu: &Gpu) -> Result<Vec<u8>, RenderError> {
     const LABEL: &str = "lanes of a subgroup";
     let device = &gpu.device;
     let module = shader::compile(device, "shared_records_probe", &[])?;
+    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let numbers: [u32; LANES as usize] = std::array::from_fn(|lane| 3u32.pow(lane as u32));
     let entry_size = size_of::<u32>();
     let mut table = TableTexture::new();
@@ -71,13 +78,18 @@ fn probe(gpu: &Gpu) -> Result<Vec<u8>, RenderError> {
         multiview_mask: None,
         cache: None,
     });
-    let view = table
-        .view()
-        .map(|view| wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) });
+    // In a uniform buffer, an entry of an array takes sixteen bytes.
+    let entries = numbers.map(|number| [number, 0, 0, 0]);
+    let mut buffer = GrowableBuffer::uniform(LABEL, entries.len());
+    buffer.replace(entries);
+    buffer.upload(gpu)?;
+    let bound = [table.view().map(wgpu::BindingResource::TextureView), buffer.bound()];
+    let bound = (0..).zip(bound.into_iter().flatten());
+    let bound = bound.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
     let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some(LABEL),
         layout: &pipeline.get_bind_group_layout(0),
-        entries: view.as_slice(),
+        entries: &bound.collect::<Vec<_>>(),
     });
     let picture = Offscreen::new(gpu, SIDE, SIDE, OffscreenFormat::Rgba8)?;
     let gray = f64::from(NOTHING) / 255.0;
@@ -100,6 +112,9 @@ fn probe(gpu: &Gpu) -> Result<Vec<u8>, RenderError> {
     pass.draw(0..3, 0..1);
     drop(pass);
     gpu.queue.submit([encoder.finish()]);
+    if let Some(error) = pollster::block_on(scope.pop()) {
+        return Err(RenderError::Refused { message: error.to_string() });
+    }
     picture.read_rgba8(gpu)
 }
 
@@ -110,8 +125,9 @@ mod tests {
     #[test]
     fn the_triangle_is_drawn_and_partly_discarded() {
         let gpu = Gpu::headless().unwrap();
-        if !gpu.device.features().contains(wgpu::Features::SUBGROUP) {
-            eprintln!("SKIPPED: {} has no subgroups", gpu.describe());
+        if !has_subgroups_of_8(&gpu) {
+            assert!(!can_share_records(&gpu));
+            eprintln!("SKIPPED: {} has no subgroups of 8", gpu.describe());
             return;
         }
         let picture = probe(&gpu).unwrap();
@@ -120,5 +136,8 @@ mod tests {
         assert_eq!(nothing + missing + arrived, (SIDE * SIDE) as usize);
         assert!(nothing > 100 && missing + arrived > 50, "{nothing} {missing} {arrived}");
         assert_eq!(can_share_records(&gpu), missing == 0 && gpu.is_software());
+        // Frames of other tests are meant to be drawn in this way here.
+        let is_known_to_work = gpu.describe().contains("llvmpipe");
+        assert!(missing == 0 || !is_known_to_work, "{missing} fragments lack a number");
     }
 }

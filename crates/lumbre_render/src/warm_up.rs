@@ -85,10 +85,12 @@ impl WarmUps {
             return None;
         }
         let (place, instance, adapter) = (Arc::clone(&self.0), gpu.instance.clone(), gpu.adapter.clone());
+        // Shaders depend on the features of their device.
+        let features = gpu.device.features();
         Some(Box::new(move || {
             let Ok(mut warm_up) = place.lock() else { return };
             if warm_up.is_none() {
-                match WarmUp::new(instance, adapter) {
+                match WarmUp::new(instance, adapter, features) {
                     Ok(new) => *warm_up = Some(new),
                     Err(error) => tracing::debug!("no pipeline can be warmed up: {error}"),
                 }
@@ -103,9 +105,13 @@ impl WarmUps {
 }
 
 impl WarmUp {
-    /// Opens a second device of the adapter.
-    fn new(instance: wgpu::Instance, adapter: wgpu::Adapter) -> Result<Self, RenderError> {
-        let gpu = Gpu::from_adapter(instance, adapter)?;
+    /// Opens a second device of the adapter, with the features of the first one.
+    fn new(
+        instance: wgpu::Instance,
+        adapter: wgpu::Adapter,
+        features: wgpu::Features,
+    ) -> Result<Self, RenderError> {
+        let gpu = Gpu::from_adapter(instance, adapter, features)?;
         let zeros = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("warm-up"),
             size: ZEROS,

@@ -169,6 +169,8 @@ impl Effect for Refraction {
         let [in_scene, switched_on] = self.called_for;
         // In an explanation without a device it is not known what is in sight.
         let in_sight = self.keys.is_none() || !self.surfaces.is_empty();
+        // No ray leaves a pane or the surface of a pool through a back face.
+        let solid = self.keys.is_none() || self.surfaces.iter().any(RefractorSurface::is_solid);
         let [width, height] = board.size;
         let described = |format| TextureDescriptor::new_2d(width, height, format);
         let mut behind = graph.texture("behind", described(board.linear_format));
@@ -184,11 +186,13 @@ impl Effect for Refraction {
                 .color(&mut behind, LoadOp::Clear(wgpu::Color::TRANSPARENT))
                 .color(&mut depths, LoadOp::Clear(wgpu::Color::TRANSPARENT))
                 .run(move |context| self.copy_frame(context, &linear, &depth));
-            graph
-                .raster_pass("back faces")
-                .color(&mut back_faces, LoadOp::Clear(wgpu::Color::TRANSPARENT))
-                .depth(&mut back_depth, LoadOp::Clear(0.0))
-                .run(move |context| self.draw_back_faces(context));
+            if solid {
+                graph
+                    .raster_pass("back faces")
+                    .color(&mut back_faces, LoadOp::Clear(wgpu::Color::TRANSPARENT))
+                    .depth(&mut back_depth, LoadOp::Clear(0.0))
+                    .run(move |context| self.draw_back_faces(context));
+            }
         }
         board
             .lit_pass(graph, LitPass::Refraction.name(), LoadOp::Load)
@@ -203,12 +207,13 @@ impl Effect for Refraction {
         if in_scene && switched_on && in_sight {
             let mirrored =
                 board.get::<MirrorPictures>().map(|pictures| pictures.0.clone()).unwrap_or_default();
+            let mut pass = board.lit_pass(graph, self.name(), LoadOp::Load).samples(&behind).samples(&depths);
+            if solid {
+                pass = pass.samples(&back_faces);
+            }
+            // Without solid bodies, any picture takes the place of their back faces, which nothing reads.
+            let back_faces = if solid { back_faces } else { behind.clone() };
             let pictures = Pictures { behind, depths, back_faces };
-            let mut pass = board
-                .lit_pass(graph, self.name(), LoadOp::Load)
-                .samples(&behind)
-                .samples(&depths)
-                .samples(&back_faces);
             for picture in mirrored.values() {
                 pass = pass.samples(picture);
             }

@@ -58,6 +58,13 @@ pub(crate) struct RefractorSurface {
     pub data: RefractorData,
 }
 
+impl RefractorSurface {
+    /// Returns true if rays enter it and leave it through a back face.
+    pub fn is_solid(&self) -> bool {
+        !self.thin && self.data.flags & RefractorData::OPEN == 0
+    }
+}
+
 /// `Refractor` of shaders/refraction.wesl.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]

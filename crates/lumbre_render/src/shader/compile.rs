@@ -45,8 +45,8 @@ mod tests {
     use super::{tested_early, to_wgsl};
     use crate::shader::{Feature, TableAccess, Variant};
 
-    /// Returns the WGSL of a variant for a device with storage buffers, after naga has validated it, and what
-    /// a software rasterizer compiles.
+    /// Returns the WGSL of a variant for a device with storage buffers. naga has validated it, and also that
+    /// for a device whose fragments load records for each other.
     fn valid(variant: &Variant) -> Arc<str> {
         let shared = valid_with(variant, TableAccess { in_textures: true, shared: true });
         let shares = variant.has(Feature::Lights)
