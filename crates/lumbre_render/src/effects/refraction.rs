@@ -212,7 +212,7 @@ impl Effect for Refraction {
                 pass = pass.samples(&back_faces);
             }
             // Without solid bodies, any picture takes the place of their back faces, which nothing reads.
-            let back_faces = if solid { back_faces } else { behind.clone() };
+            let back_faces = if solid { back_faces } else { behind };
             let pictures = Pictures { behind, depths, back_faces };
             for picture in mirrored.values() {
                 pass = pass.samples(picture);
