@@ -678,6 +678,10 @@ const NO_SCENE: &[(&str, &str)] = &[
     ("MULTISAMPLED", "depths of several samples behind glass: `refraction`'s tests"),
     ("G_BUFFER_DETAILS", "what the G-buffer holds of lightmaps and textures: `rendering_paths`' tests"),
     ("TABLES_IN_TEXTURES", "of the device: where a processor draws"),
+    (
+        "SUBGROUPS_OF_8",
+        "of the device: a processor whose fragments load records for each other; see tests/shared_records.rs of lumbre_render",
+    ),
     ("DECODE_SRGB", "targets that encode by themselves: `display`'s tests"),
 ];
 
