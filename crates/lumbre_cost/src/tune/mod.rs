@@ -13,7 +13,7 @@ use std::time::Instant;
 use bevy_ecs::prelude::*;
 use lumbre_optics::Shading;
 use lumbre_render::{FrameOptions, Gpu, Renderer};
-use lumbre_scene::{ActiveCamera, Camera, Name};
+use lumbre_scene::{ActiveCamera, Camera, Lightmap, Name};
 
 pub(crate) use self::candidates::Candidates;
 pub use self::draw_settings::DrawSettings;
@@ -118,6 +118,7 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     let choices = Choices::of(&mut world, None);
     let mut own = world.query::<&Shading>();
     let choosers = own.iter(&world).count();
+    let lightmapped = world.query::<&Lightmap>().iter(&world).count();
 
     let mut measured = Measured { study: study(&scene.name), ..Measured::default() };
     let mut found = Candidates::default();
@@ -154,6 +155,12 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
         study.notes.push(format!(
             "{choosers} objects choose their own shading and keep it here; --shading in the commands overrides it."
         ));
+    }
+    if lightmapped > 0 {
+        study.notes.push(
+            "The density of lightmaps is not among the settings: it affects their error and size, but hardly the time of a frame; `lumbre cost --study lightmaps` shows by how much."
+                .into(),
+        );
     }
     // The other ways are beaten, and their times are from earlier rounds.
     let last: Vec<Point> = contenders.iter().map(|&place| study.points[place].clone()).collect();
