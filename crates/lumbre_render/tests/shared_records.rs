@@ -126,6 +126,7 @@ fn shared_loads_draw_the_same_frame() {
     }
     let floats = whole.adapter.features() & wgpu::Features::FLOAT32_BLENDABLE;
     let [with, without] = [subgroups | floats, floats].map(|features| device(&whole, features));
+    // Both add the same f32 values; only a compiler's choice between equal expressions may differ.
     let differ =
         |[one, other]: [&Vec4; 2]| (*one - *other).abs().max_element() > 1e-5 * (1.0 + other.max_element());
     for path in [RenderingPath::Forward, RenderingPath::Deferred] {
