@@ -63,11 +63,11 @@ pub struct App {
 impl App {
     /// Creates the application. Its window opens when the event loop runs.
     pub fn new(opened: Opened, options: PlayOptions, replay: Option<&Recording>) -> Self {
-        let overlay = Overlay::default();
-        if options.screenshot.is_some() {
-            // A text that fades in over a twelfth of a second might be missing in the last frame.
-            overlay.context.all_styles_mut(|style| style.animation_time = 0.0);
-        }
+        let overlay = match options.screenshot {
+            // The last frame shows everything that is said by then, however fast the frames are.
+            Some(_) => Overlay::without_fading(),
+            None => Overlay::default(),
+        };
         let replay = replay.map(|recording| recording.player().collect::<Vec<_>>().into_iter());
         Self {
             viewing: match options.bake {

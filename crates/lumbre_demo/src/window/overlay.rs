@@ -54,6 +54,8 @@ pub struct Facts {
 pub struct Overlay {
     /// egui's context; created again with every device, because it tracks which fonts were uploaded.
     pub context: egui::Context,
+    /// Whether panels fade in over a few frames.
+    fades: bool,
     frame_ms: VecDeque<f32>,
     /// The reference picture of the view.
     reference: Option<egui::TextureHandle>,
@@ -63,7 +65,13 @@ pub struct Overlay {
 
 impl Default for Overlay {
     fn default() -> Self {
-        Self { context: egui::Context::default(), frame_ms: VecDeque::default(), reference: None, split: 0.5 }
+        Self {
+            context: egui::Context::default(),
+            fades: true,
+            frame_ms: VecDeque::default(),
+            reference: None,
+            split: 0.5,
+        }
     }
 }
 
@@ -76,6 +84,13 @@ pub struct LaidOut {
 }
 
 impl Overlay {
+    /// Creates an overlay whose panels are fully there from the first frame that shows them.
+    pub fn without_fading() -> Self {
+        let mut overlay = Self { fades: false, ..Self::default() };
+        overlay.forget_device();
+        overlay
+    }
+
     /// Adds the duration of a frame, milliseconds.
     pub fn note_frame(&mut self, milliseconds: f32) {
         self.frame_ms.push_back(milliseconds);
@@ -89,6 +104,9 @@ impl Overlay {
         // The texture belongs to the old context.
         self.reference = None;
         self.context = egui::Context::default();
+        if !self.fades {
+            self.context.all_styles_mut(|style| style.animation_time = 0.0);
+        }
     }
 
     /// Shows this reference from now on: `size` in pixels, and RGBA bytes.
@@ -317,14 +335,18 @@ fn exposure_value(factor: f32) -> f64 {
 mod tests {
     use super::*;
 
-    fn texts(overlay: &mut Overlay, facts: &Facts) -> String {
-        fn collect(shape: &egui::Shape, text: &mut String) {
+    /// Returns the texts of a frame, and the opacity of the faintest, 0 to 1.
+    fn texts_and_opacity(overlay: &mut Overlay, facts: &Facts) -> (String, f32) {
+        fn collect(shape: &egui::Shape, text: &mut String, opacity: &mut f32) {
             match shape {
                 egui::Shape::Text(one) => {
                     text.push_str(one.galley.text());
                     text.push('\n');
+                    let vertices = one.galley.rows.iter().flat_map(|row| &row.visuals.mesh.vertices);
+                    let strongest = vertices.map(|vertex| vertex.color.a()).max().unwrap_or(u8::MAX);
+                    *opacity = opacity.min(f32::from(strongest) / 255.0);
                 }
-                egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, text)),
+                egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, text, opacity)),
                 _ => {}
             }
         }
@@ -334,13 +356,25 @@ mod tests {
         };
         // egui lays out a window in its first frame and shows it in its second.
         overlay.lay_out(input(), facts, None).output.drop_without_applying_deltas();
-        let mut text = String::new();
+        let (mut text, mut opacity) = (String::new(), 1.0);
         let output = overlay.lay_out(input(), facts, None).output;
         for clipped in &output.shapes {
-            collect(&clipped.shape, &mut text);
+            collect(&clipped.shape, &mut text, &mut opacity);
         }
         output.drop_without_applying_deltas();
-        text
+        (text, opacity)
+    }
+
+    fn texts(overlay: &mut Overlay, facts: &Facts) -> String {
+        texts_and_opacity(overlay, facts).0
+    }
+
+    /// Facts of a frame without the overlay, after a file could not be opened.
+    fn with_an_error(text: &str) -> Facts {
+        let mut facts =
+            Facts { view: ViewSettings { overlay: false, ..ViewSettings::default() }, ..Facts::default() };
+        facts.file.message = Some(super::super::viewing::Message { text: text.to_owned(), is_error: true });
+        facts
     }
 
     #[test]
@@ -399,11 +433,21 @@ mod tests {
 
     #[test]
     fn an_error_is_said_even_if_the_overlay_is_off() {
-        let mut facts =
-            Facts { view: ViewSettings { overlay: false, ..ViewSettings::default() }, ..Facts::default() };
-        let text = "broken.glb: is no glTF file".to_owned();
-        facts.file.message = Some(super::super::viewing::Message { text: text.clone(), is_error: true });
-        assert_eq!(texts(&mut Overlay::default(), &facts).trim(), text);
+        let text = "broken.glb: is no glTF file";
+        assert_eq!(texts(&mut Overlay::default(), &with_an_error(text)).trim(), text);
+    }
+
+    #[test]
+    fn without_fading_a_text_is_fully_there_at_once_on_every_device() {
+        let facts = with_an_error("broken.glb: is no glTF file");
+        let (_, opacity) = texts_and_opacity(&mut Overlay::default(), &facts);
+        assert!(opacity < 1.0, "this test sees no fading: {opacity}");
+        let mut overlay = Overlay::without_fading();
+        for device in 0..2 {
+            let (_, opacity) = texts_and_opacity(&mut overlay, &facts);
+            assert_eq!(opacity, 1.0, "device {device}");
+            overlay.forget_device();
+        }
     }
 
     #[test]
