@@ -36,7 +36,7 @@ pub(crate) use record::Record;
 use replace_file::{remove_if_there, temporary_path};
 
 /// Version of the file format; files of other versions are not read.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Where a bake keeps what it has computed, and whether it resumes from what is there.
 ///

@@ -1,7 +1,7 @@
 //! The footprint of each texel: the pieces of triangles that lie in its square, found by conservative rasterisation, so
 //! that a texel that a triangle merely touches is covered too. Which of it other geometry hides is found in `hidden`.
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::scene::Receiver;
@@ -17,6 +17,17 @@ pub(crate) struct FootprintPoint {
     pub at: (f32, f32),
     /// Its position in the texel's unit square.
     pub offset: Vec2,
+}
+
+/// The directions of a map on a surface that it shows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MapAxes {
+    /// The steps on the surface from one column to the next and from one row to the next, in units of [`Texel::side`];
+    /// zero where the surface has no area.
+    pub column: Vec3,
+    pub row: Vec3,
+    /// The surface's unit normal.
+    pub normal: Vec3,
 }
 
 /// The part of the scene that a texel shows.
@@ -242,6 +253,24 @@ impl Texel {
         let triangle = &scene.triangles[self.triangle as usize];
         let [a, b, c] = triangle.uv;
         (2.0 * triangle.area / (b - a).perp_dot(c - a).abs()).sqrt()
+    }
+
+    /// The directions of the map on the texel's surface.
+    pub fn map_axes(&self, scene: &BakeScene) -> MapAxes {
+        let triangle = &scene.triangles[self.triangle as usize];
+        let [a, b, c] = triangle.uv;
+        let (first, second) = (b - a, c - a);
+        let corner = triangle.position(0.0, 0.0);
+        let (along_first, along_second) =
+            (triangle.position(1.0, 0.0) - corner, triangle.position(0.0, 1.0) - corner);
+        let scale = 1.0 / (first.perp_dot(second) * self.side(scene));
+        // A triangle without area, but with one in the map, has no directions.
+        let scale = if scale.is_finite() { scale } else { 0.0 };
+        MapAxes {
+            column: (along_first * second.y - along_second * first.y) * scale,
+            row: (along_second * first.x - along_first * second.x) * scale,
+            normal: triangle.normal,
+        }
     }
 
     /// Whether other geometry hides all of it.

@@ -6,6 +6,7 @@ pub(crate) mod conserve_light;
 pub(crate) mod filter_features;
 pub(crate) mod filter_pass;
 pub(crate) mod kernel;
+pub(crate) mod nearness;
 pub(crate) mod neighbourhoods;
 pub(crate) mod neighbours;
 pub(crate) mod plane;

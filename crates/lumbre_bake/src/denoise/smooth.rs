@@ -14,6 +14,7 @@ use super::filter_features::{
 };
 use super::filter_pass::{BIAS, FilterPass, Smoothed};
 use super::kernel::Kernel;
+use super::nearness::Nearness;
 use super::neighbourhoods::Neighbourhoods;
 use super::neighbours::Block;
 use super::plane::VALUES;
@@ -31,21 +32,23 @@ const FIRST: FilterPass = FilterPass { width: 2.5, near: 1.0, guide_steps: 1, bi
 const SECOND: FilterPass = FilterPass { width: 9.0, near: 12.0, guide_steps: 0, bias_noise: 0.33 };
 
 /// The smoothed estimates of every covered texel, and the squared bias that smoothing may have brought, mean of the
-/// channels. `inverse_distances` holds, per texel, the mean of 1 / distance to the surfaces or lights that its samples
-/// reached.
+/// channels. `nearness` holds, per texel, the mean of that of the surfaces or lights that its samples reached.
 pub(crate) fn smooth(
     neighbourhoods: &Neighbourhoods<'_>,
     estimates: &[Estimates],
-    inverse_distances: &[f32],
+    nearness: &[Nearness],
 ) -> (Vec<Estimates>, Vec<f32>) {
     let grid = neighbourhoods.grid();
-    let distances_and_sides: ChannelRows<2> = neighbourhoods
-        .fill(|index| [inverse_distances[index], neighbourhoods.texel_side(&neighbourhoods.texels[index])]);
+    let nearness: ChannelRows<3> = neighbourhoods.fill(|index| {
+        let side = neighbourhoods.texel_side(&neighbourhoods.texels[index]);
+        let Nearness { xx, xy, yy } = nearness[index].scaled(side);
+        [xx, xy, yy]
+    });
     let mut smoothed: Smoothed = neighbourhoods.fill(|index| {
         let estimates = &estimates[index];
         std::array::from_fn(|place| if place < BIAS { estimates[place / 3][place % 3] } else { 0.0 })
     });
-    smooth_rows(grid, distances_and_sides, &mut smoothed);
+    smooth_rows(grid, nearness, &mut smoothed);
     let values = neighbourhoods.read(&smoothed).into_par_iter();
     let results = values.zip(neighbourhoods.texels).zip(estimates).map(|((values, texel), estimates)| {
         let smoothed = std::array::from_fn(|replicate| Vec3::from_slice(&values[3 * replicate..]));
@@ -56,12 +59,12 @@ pub(crate) fn smooth(
     (smoothed, biases)
 }
 
-/// Both passes, in place. `distances_and_sides` holds the inverse distances and the texels' side lengths.
-fn smooth_rows(grid: &TexelRows, distances_and_sides: ChannelRows<2>, estimates: &mut Smoothed) {
-    let nearness = grid.compute(&Nearness(&distances_and_sides));
-    drop(distances_and_sides);
-    FIRST.smooth::<1, 7>(grid, estimates, &nearness);
-    SECOND.smooth::<3, 9>(grid, estimates, &nearness);
+/// Both passes, in place. `nearness` holds that of each texel, times the texel's side.
+fn smooth_rows(grid: &TexelRows, nearness: ChannelRows<3>, estimates: &mut Smoothed) {
+    let reach = grid.compute(&SquaredNearness(&nearness));
+    drop(nearness);
+    FIRST.smooth::<1, 7>(grid, estimates, &reach);
+    SECOND.smooth::<3, 9>(grid, estimates, &reach);
 }
 
 impl FilterPass {
@@ -71,7 +74,7 @@ impl FilterPass {
         &self,
         grid: &TexelRows,
         estimates: &mut Smoothed,
-        nearness: &ChannelRows<1>,
+        nearness: &ChannelRows<3>,
     ) {
         let variances = grid.compute(&Variances(estimates));
         let features =
@@ -86,16 +89,23 @@ impl FilterPass {
     }
 }
 
-/// How near other surfaces are to a texel: the square of its side over their harmonic mean distance.
-struct Nearness<'a>(&'a ChannelRows<2>);
+/// How near other surfaces are around a texel, by direction: the square of the matrix of nearness, so that its value in
+/// a direction is the square of the texel's side over the harmonic mean distance.
+struct SquaredNearness<'a>(&'a ChannelRows<3>);
 
-impl Kernel<1> for Nearness<'_> {
+impl Kernel<3> for SquaredNearness<'_> {
     #[inline(always)]
-    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; 1]) -> [f32x8<S>; 1] {
-        let inverse_distance = block.mean(self.0, 0, NOISE_STEPS, 1);
-        let ratio = inverse_distance * block.center(self.0, 1);
-        let is_finite = ratio.abs().simd_lt(f32::INFINITY);
-        [is_finite.select(ratio * ratio, block.simd.splat_f32x8(0.0))]
+    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; 3]) -> [f32x8<S>; 3] {
+        let [xx, xy, yy] = [0, 1, 2].map(
+            #[inline(always)]
+            |channel| block.mean(self.0, channel, NOISE_STEPS, 1),
+        );
+        let squared = [xx * xx + xy * xy, xy * (xx + yy), xy * xy + yy * yy];
+        let is_finite = (squared[0] + squared[2]).simd_lt(f32::INFINITY);
+        squared.map(
+            #[inline(always)]
+            |value| is_finite.select(value, block.simd.splat_f32x8(0.0)),
+        )
     }
 }
 
@@ -137,6 +147,7 @@ mod tests {
     use fearless_simd::Level;
 
     use super::super::neighbours::tests::{random_channels, random_grid};
+    use super::super::surface::Surface;
     use super::*;
 
     #[test]
@@ -156,5 +167,38 @@ mod tests {
         let before: Smoothed = random_channels(&grid, 3);
         let changed = before.values.iter().zip(&best).filter(|(before, after)| before != after).count();
         assert!(2 * changed > best.iter().filter(|value| **value != 0.0).count(), "{changed}");
+    }
+
+    /// The variance of the smoothed values of the top row over that of the noise, on a plane beside a wall along that
+    /// row. The harmonic mean distance to the wall is a texel's side; `along` is the nearness along the wall.
+    fn remaining_variance(along: f32) -> f32 {
+        let size = (256, 24);
+        let surface = Surface { chart: 0, normal: Vec3::Z, group: 0 };
+        let cells = std::iter::repeat_n(0, (size.0 * size.1) as usize);
+        let grid = TexelRows::new([size].into_iter(), cells, vec![surface]);
+        let mut estimates: Smoothed = random_channels(&grid, 7);
+        let before = top_row(&grid, &estimates);
+        let nearness = grid.fill(|row, _| match row {
+            0..3 => [along, 0.0, 1.0],
+            _ => [0.0; 3],
+        });
+        smooth_rows(&grid, nearness, &mut estimates);
+        variance(&top_row(&grid, &estimates)) / variance(&before)
+    }
+
+    fn top_row(grid: &TexelRows, estimates: &Smoothed) -> Vec<f32> {
+        (0..256).map(|column| grid.get(estimates, 0, column)[0]).collect()
+    }
+
+    fn variance(values: &[f32]) -> f32 {
+        let mean = values.iter().sum::<f32>() / values.len() as f32;
+        values.iter().map(|value| (value - mean).powi(2)).sum::<f32>() / values.len() as f32
+    }
+
+    #[test]
+    fn beside_a_joint_noise_is_smoothed_along_it() {
+        let (along, nowhere) = (remaining_variance(0.005), remaining_variance(1.0));
+        assert!(along < 0.1, "{along}");
+        assert!(nowhere > 0.3, "{nowhere}: nothing here keeps smoothing from reaching along the wall");
     }
 }

@@ -17,7 +17,8 @@ const GUIDE_VARIANCES: f32 = 8.0;
 pub(crate) struct Fit<'a, const STEP: usize, const COLUMNS: usize> {
     pub pass: &'a FilterPass,
     pub estimates: &'a Smoothed,
-    pub nearness: &'a ChannelRows<1>,
+    /// Per texel, the square of the matrix of its nearness.
+    pub nearness: &'a ChannelRows<3>,
     pub features: &'a ChannelRows<FEATURES>,
 }
 
@@ -31,11 +32,16 @@ impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, C
             *feature = block.center(self.features, place);
         }
         let near = self.pass.near * self.pass.near;
-        let distance_scale = block.center(self.nearness, 0) * near + self.pass.width.powi(-2);
+        let width = self.pass.width.powi(-2);
+        let distance_scales = [
+            block.center(self.nearness, 0) * near + width,
+            block.center(self.nearness, 1) * (2.0 * near),
+            block.center(self.nearness, 2) * near + width,
+        ];
         // The variance of a guide relative to that of a texel's mean: twice as much for a half, divided by the texels
         // averaged.
         let guide_noise = GUIDE_VARIANCES * 2.0 / ((2 * self.pass.guide_steps + 1) as f32).powi(2);
-        let texels = CenterTexels { features, distance_scale, guide_noise };
+        let texels = CenterTexels { features, distance_scales, guide_noise };
         let mut weights = [[zero; COLUMNS]; 2];
         let mut planes = Planes::new(simd);
         for row in block.rows(COLUMNS / 2, STEP) {
@@ -67,8 +73,8 @@ impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, C
 /// The properties of the center texels that the weights depend on.
 struct CenterTexels<S: Simd> {
     features: [f32x8<S>; FEATURES],
-    /// The factor of squared distances in texels.
-    distance_scale: f32x8<S>,
+    /// The factors of x², x y and y² of a distance of x columns and y rows.
+    distance_scales: [f32x8<S>; 3],
     /// The factor of the noise of two texels, by which squared differences of their guides are divided.
     guide_noise: f32,
 }
@@ -86,7 +92,7 @@ impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
     ) {
         let simd = block.simd;
         let zero = simd.splat_f32x8(0.0);
-        let CenterTexels { features: center, distance_scale, guide_noise } = texels;
+        let CenterTexels { features: center, distance_scales: [xx, xy, yy], guide_noise } = texels;
         let y = row.down as f32;
         let mut features = [self.features.window(row, NOISE); FEATURES];
         for (place, guide) in features.iter_mut().enumerate() {
@@ -98,7 +104,7 @@ impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
             let noise: f32x8<S> = lanes(simd, features[NOISE], at);
             let expected = (center[NOISE] + noise) * *guide_noise;
             let inverse = simd.splat_f32x8(1.0) / expected.max(f32::MIN_POSITIVE);
-            let distance_term = *distance_scale * (x * x + y * y);
+            let distance_term = *xx * (x * x) + *xy * (x * y) + *yy * (y * y);
             let mask = if ON_SURFACE { simd.splat_mask32x8(true) } else { block.neighbour_mask(row, at) };
             for (half, weights) in weights.iter_mut().enumerate() {
                 let mut squares = [zero; 3];
@@ -165,7 +171,13 @@ mod tests {
     fn the_fit_is_the_plane_of_weighted_least_squares() {
         let grid = random_grid(Level::new());
         let pass = FilterPass { width: 9.0, near: 0.5, guide_steps: 0, bias_noise: 0.0 };
-        let (estimates, nearness) = (random_channels(&grid, 1), random_channels(&grid, 2));
+        let estimates = random_channels(&grid, 1);
+        let numbers = random_channels(&grid, 2);
+        // A square of a matrix is negative in no direction.
+        let nearness = grid.fill(|row, column| {
+            let [xx, xy, yy] = grid.get(&numbers, row, column);
+            [xx, (2.0 * xy - 1.0) * (xx * yy).sqrt(), yy]
+        });
         let features: ChannelRows<FEATURES> = random_channels(&grid, 3);
         let fit: Fit<'_, 3, 9> =
             Fit { pass: &pass, estimates: &estimates, nearness: &nearness, features: &features };
@@ -177,7 +189,7 @@ mod tests {
                 |row: usize, column: usize| grid.cell_surfaces[grid.rows[row].start + MARGIN + column];
             for column in (0..width).filter(|&column| surface(row, column) != NONE) {
                 let center = grid.get(&features, row, column).map(f64::from);
-                let near = f64::from(grid.get(&nearness, row, column)[0]);
+                let near = grid.get(&nearness, row, column).map(f64::from);
                 let mut points: [Vec<[f64; 4]>; VALUES] = Default::default();
                 for (down, right) in
                     (-4..=4).flat_map(|down| (-4..=4).map(move |right| (3 * down, 3 * right)))
@@ -197,7 +209,8 @@ mod tests {
                         let half = k / (3 * REPLICATES_PER_HALF);
                         let squared_difference =
                             (0..3).map(|c| (center[3 * half + c] - other[3 * half + c]).powi(2)).sum::<f64>();
-                        let distance_term = (x * x + y * y) * (1.0 / 81.0 + 0.25 * near);
+                        let nearness = near[0] * x * x + 2.0 * near[1] * x * y + near[2] * y * y;
+                        let distance_term = (x * x + y * y) / 81.0 + 0.25 * nearness;
                         // A guide has twice the variance, and eight variances have weight e⁻¹.
                         let exponent =
                             distance_term + squared_difference / (8.0 * 2.0 * (center[NOISE] + other[NOISE]));

@@ -12,6 +12,7 @@ use super::local_light::LocalLight;
 use crate::chunks::{decide, in_chunks, in_chunks_until_deadline};
 use crate::coverage::footprint::{Texel, receiver};
 use crate::coverage::tile_sequence::TileSequence;
+use crate::denoise::nearness::Nearness;
 use crate::denoise::neighbourhoods::Neighbourhoods;
 use crate::denoise::replicates::{Estimates, REPLICATES, mean, spread};
 use crate::denoise::smooth::smooth;
@@ -59,8 +60,9 @@ impl SampleSums {
         self.sums.map(|sum| sum / self.samples.max(1) as f32)
     }
 
-    fn inverse_distance(&self) -> f32 {
-        self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
+    /// Of lights, whose shadows run in any direction.
+    fn mean_nearness(&self) -> Nearness {
+        Nearness::of_lamp(self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32)
     }
 
     /// Adds samples until each replicate has `samples`; `run` is the first run's length of a [`TileSequence`].
@@ -188,9 +190,8 @@ impl<'a> SharedLight<'a> {
         let raw: Vec<Estimates> = self.sums.par_iter().map(SampleSums::estimates).collect();
         let (estimates, bias) = monitor.run_interruptible(1.0, || match self.options.denoise {
             true => {
-                let inverse_distances: Vec<f32> =
-                    self.sums.par_iter().map(SampleSums::inverse_distance).collect();
-                smooth(&self.neighbourhoods, &raw, &inverse_distances)
+                let nearness: Vec<Nearness> = self.sums.par_iter().map(SampleSums::mean_nearness).collect();
+                smooth(&self.neighbourhoods, &raw, &nearness)
             }
             false => (raw, vec![0.0; self.sums.len()]),
         })?;

@@ -4,6 +4,7 @@
 //! so near a hit, the path makes another bounce instead. Emission is not read: `direct_light` has already counted it.
 //! Not where rays go and what they hit: that is `incident`.
 
+use crate::denoise::nearness::Nearness;
 use crate::denoise::replicates::REPLICATES;
 use crate::final_gather::gather_sums::{GatherSums, UnguidedLight};
 use std::cell::RefCell;
@@ -192,6 +193,7 @@ impl RadianceCache<'_> {
         gathered: &mut GatherSums,
     ) {
         samples.follow(self);
+        let map_axes = texel.map_axes(self.scene);
         checks.count = 0;
         let tags = &samples.tags[..samples.count];
         for (slot, (incident, &(replicate, sample))) in samples.results.iter_mut().zip(tags).enumerate() {
@@ -208,7 +210,9 @@ impl RadianceCache<'_> {
                 hit.direct = direct;
                 contribution.rays += rays;
             }
-            gathered.inverse_distances += incident.weight / hit.distance.max(f32::MIN_POSITIVE);
+            let inverse_distance = incident.weight / hit.distance.max(f32::MIN_POSITIVE);
+            let normal = self.scene.triangles[hit.triangle as usize].normal;
+            gathered.nearness.add(Nearness::of_surface(inverse_distance, normal, &map_axes));
             // Takes turns over replicates, samples and texels: every neighbourhood gets checks, however few samples
             // there are.
             let turn =

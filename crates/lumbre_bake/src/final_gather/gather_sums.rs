@@ -4,6 +4,7 @@
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::denoise::nearness::Nearness;
 use crate::denoise::replicates::REPLICATES;
 use crate::radiosity::patch_index::PatchIndex;
 
@@ -66,8 +67,8 @@ pub(crate) struct GatherSums {
     pub checks: u32,
     pub differences: Vec3,
     pub squared_differences: f32,
-    /// Weighted sum over all samples of 1 / distance to the surface that was hit, canonical units.
-    pub inverse_distances: f32,
+    /// Weighted sum over all samples of the nearness of the surface that was hit.
+    pub nearness: Nearness,
     /// Samples of each replicate.
     pub samples: u32,
     /// Rays cast.
@@ -121,10 +122,9 @@ impl GatherSums {
         })
     }
 
-    /// Mean of 1 / distance to the surfaces that light comes from. Its inverse is the length over which the irradiance
-    /// changes (Ward, Rubinstein and Clear, "A Ray Tracing Solution for Diffuse Interreflection", 1988).
-    pub fn inverse_distance(&self) -> f32 {
-        self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
+    /// Mean nearness of the surfaces that light comes from.
+    pub fn mean_nearness(&self) -> Nearness {
+        self.nearness.scaled(1.0 / self.count() as f32)
     }
 
     /// The sum of all samples of all replicates, W/m², mean of the channels.

@@ -16,6 +16,7 @@ use super::reused_gather::ReusedGather;
 use crate::chunks::decide;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::Texel;
+use crate::denoise::nearness::Nearness;
 use crate::denoise::neighbourhoods::Neighbourhoods;
 use crate::denoise::replicates::{Estimates, REPLICATES, mean, spread};
 use crate::denoise::smooth::smooth;
@@ -286,8 +287,8 @@ impl<'a> RoundPlanner<'a> {
         let raw: Vec<Estimates> = gathered.par_iter().map(GatherSums::estimates).collect();
         let (estimates, smoothing) = monitor.run_interruptible(1.0, || match self.options.denoise {
             true => {
-                let near: Vec<f32> = gathered.par_iter().map(GatherSums::inverse_distance).collect();
-                smooth(neighbourhoods, &raw, &near)
+                let nearness: Vec<Nearness> = gathered.par_iter().map(GatherSums::mean_nearness).collect();
+                smooth(neighbourhoods, &raw, &nearness)
             }
             false => (raw.clone(), vec![0.0; texels.len()]),
         })?;

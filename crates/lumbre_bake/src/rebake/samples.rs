@@ -80,11 +80,12 @@ impl TexelSamples {
             texel_variances,
             differences,
             squared_differences,
-            inverse_distances,
+            nearness,
             ..
         } = gathered;
         let finite = (direct.baked + direct.mixed + *bounced + *differences).is_finite()
-            && (direct.variance + *squared_differences + *inverse_distances).is_finite()
+            && (direct.variance + *squared_differences).is_finite()
+            && nearness.is_finite()
             && patch_errors.is_finite()
             && texel_variances.is_finite()
             && sums.iter().all(|sum| sum.is_finite());

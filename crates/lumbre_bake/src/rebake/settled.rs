@@ -20,19 +20,19 @@ pub(super) fn serialize<S: Serializer>(gathered: &GatherSums, serializer: S) -> 
         checks,
         differences,
         squared_differences,
-        inverse_distances,
+        nearness,
         samples,
         rays: _,
         unguided: _,
     } = gathered;
-    let rays = (patch_errors, texel_variances, texel_reads, inverse_distances);
+    let rays = (patch_errors, texel_variances, texel_reads, nearness);
     (sums, samples, rays, (checks, differences, squared_differences)).serialize(serializer)
 }
 
 /// For serde's `with`.
 pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<GatherSums, D::Error> {
     let (sums, samples, rays, of_checks) = Deserialize::deserialize(deserializer)?;
-    let (patch_errors, texel_variances, texel_reads, inverse_distances) = rays;
+    let (patch_errors, texel_variances, texel_reads, nearness) = rays;
     let (checks, differences, squared_differences) = of_checks;
     let weights = <[Vec3; REPLICATES]>::map(sums, |sum| Weights::of_equal(sum, samples));
     Ok(GatherSums {
@@ -44,7 +44,7 @@ pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
         checks,
         differences,
         squared_differences,
-        inverse_distances,
+        nearness,
         samples,
         rays: 0,
         unguided: UnguidedLight::NONE,
