@@ -6,6 +6,7 @@ use std::mem::size_of;
 
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Footprint, FootprintPoint, Texel};
+use crate::denoise::nearness::Nearness;
 use crate::denoise::replicates::Estimates;
 use crate::denoise::texel_rows::BESIDE_A_ROW;
 use crate::error::mebibytes;
@@ -26,20 +27,21 @@ const TRIANGLE_BYTES: u64 =
     (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32) as u64;
 
 /// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
-/// round, raw and smoothed estimates with their guides, sixteen lists of one number each for the errors, its chart, the
+/// round, raw and smoothed estimates with their guides, its nearness, sixteen lists of one number each for the errors, its chart, the
 /// light around it, and its block. (The sums of the shared samples of direct light need less, and are freed by then.)
 const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + size_of::<Direct>()
     + 2 * size_of::<GatherSums>()
     + 2 * size_of::<Estimates>()
     + 24
+    + size_of::<Nearness>()
     + 16 * 4
     + 4 * 4) as u64;
 
 /// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later:
 /// estimates with their bias, the numbers of the weighted fit, guides with the noise, products, and nearness. Besides,
 /// its place among the covered texels and its surface, and what rays that hit it read.
-const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + size_of::<TexelRadiance>() as u64;
+const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 3) + 8 + size_of::<TexelRadiance>() as u64;
 
 /// Per texel of a map, for separate maps of direct and bounced light: both as computed, as filled, and as divided.
 const SEPARATE_LIGHT_BYTES: u64 = 6 * 12;

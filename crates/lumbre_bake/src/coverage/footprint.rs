@@ -19,15 +19,17 @@ pub(crate) struct FootprintPoint {
     pub offset: Vec2,
 }
 
-/// The directions of a map on a surface that it shows.
-#[derive(Clone, Copy, Debug)]
+/// How a map lies on the surface that it shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MapAxes {
-    /// The steps on the surface from one column to the next and from one row to the next, in units of [`Texel::side`];
-    /// zero where the surface has no area.
-    pub column: Vec3,
-    pub row: Vec3,
+    /// Unit vectors on the surface: in the direction of the map's rows, and square to it. Zero if the surface has no area.
+    pub along: Vec3,
+    pub across: Vec3,
     /// The surface's unit normal.
     pub normal: Vec3,
+    /// The steps from one column to the next and from one row to the next, by `along` and `across`, canonical units.
+    pub column_step: Vec2,
+    pub row_step: Vec2,
 }
 
 /// The part of the scene that a texel shows.
@@ -255,27 +257,40 @@ impl Texel {
         (2.0 * triangle.area / (b - a).perp_dot(c - a).abs()).sqrt()
     }
 
-    /// The directions of the map on the texel's surface.
+    /// How the map lies on the texel's surface.
     pub fn map_axes(&self, scene: &BakeScene) -> MapAxes {
         let triangle = &scene.triangles[self.triangle as usize];
-        let [a, b, c] = triangle.uv;
-        let (first, second) = (b - a, c - a);
-        let corner = triangle.position(0.0, 0.0);
-        let (along_first, along_second) =
-            (triangle.position(1.0, 0.0) - corner, triangle.position(0.0, 1.0) - corner);
-        let scale = 1.0 / (first.perp_dot(second) * self.side(scene));
-        // A triangle without area, but with one in the map, has no directions.
-        let scale = if scale.is_finite() { scale } else { 0.0 };
-        MapAxes {
-            column: (along_first * second.y - along_second * first.y) * scale,
-            row: (along_second * first.x - along_first * second.x) * scale,
-            normal: triangle.normal,
-        }
+        MapAxes::of(triangle.corners, triangle.uv, triangle.normal)
     }
 
     /// Whether other geometry hides all of it.
     pub fn is_hidden(&self) -> bool {
         self.footprint == Footprint::Hidden
+    }
+}
+
+impl MapAxes {
+    /// How the map lies on a triangle with these corners, which are at `uv` in the map, and this unit normal.
+    fn of([a, b, c]: [Vec3; 3], [at_a, at_b, at_c]: [Vec2; 3], normal: Vec3) -> Self {
+        let (first, second) = (at_b - at_a, at_c - at_a);
+        let scale = first.perp_dot(second).recip();
+        let column = ((b - a) * second.y - (c - a) * first.y) * scale;
+        let row = ((c - a) * first.x - (b - a) * second.x) * scale;
+        let along = column.normalize_or_zero();
+        let across = normal.cross(along);
+        let step = |step: Vec3| Vec2::new(step.dot(along), step.dot(across));
+        let axes = Self { along, across, normal, column_step: step(column), row_step: step(row) };
+        // A triangle without area may have one in the map.
+        match axes.column_step.is_finite() && axes.row_step.is_finite() {
+            true => axes,
+            false => Self {
+                along: Vec3::ZERO,
+                across: Vec3::ZERO,
+                column_step: Vec2::ZERO,
+                row_step: Vec2::ZERO,
+                ..axes
+            },
+        }
     }
 }
 
@@ -303,4 +318,42 @@ fn on_curved_surface(triangle: &SceneTriangle, position: glam::Vec3, u: f32, v: 
             (position - normal * (position - corner).dot(normal).min(0.0)) * weights[i]
         })
         .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_a_map_lead_from_texel_to_texel() {
+        let corners = [Vec3::new(1.0, 0.5, -2.0), Vec3::new(2.5, 1.0, -1.0), Vec3::new(0.0, 3.0, 0.5)];
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+        let maps = [
+            [Vec2::new(3.0, 4.0), Vec2::new(20.0, 6.0), Vec2::new(5.0, 31.0)],
+            // Mirrored, and stretched.
+            [Vec2::new(3.0, 4.0), Vec2::new(5.0, 90.0), Vec2::new(20.0, 6.0)],
+            // Sheared.
+            [Vec2::new(50.0, 40.0), Vec2::new(10.0, 2.0), Vec2::new(9.0, 7.0)],
+        ];
+        for uv in maps {
+            let axes = MapAxes::of(corners, uv, normal);
+            assert!(axes.along.is_normalized() && axes.across.is_normalized());
+            assert!(axes.along.dot(axes.across).abs() < 1e-6 && axes.across.dot(normal).abs() < 1e-6);
+            let from = uv[0];
+            for (to, corner) in uv.iter().zip(corners) {
+                let step = axes.column_step * (to.x - from.x) + axes.row_step * (to.y - from.y);
+                let reached = corners[0] + axes.along * step.x + axes.across * step.y;
+                assert!(reached.distance(corner) < 1e-5, "{uv:?}: {reached} is not {corner}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_map_on_a_triangle_without_area_has_no_steps() {
+        let uv = [Vec2::ZERO, Vec2::X, Vec2::Y];
+        for (corners, uv) in [([Vec3::ONE; 3], uv), ([Vec3::ZERO, Vec3::X, Vec3::Y], [Vec2::ZERO; 3])] {
+            let axes = MapAxes::of(corners, uv, Vec3::Z);
+            assert_eq!((axes.along, axes.column_step, axes.row_step), (Vec3::ZERO, Vec2::ZERO, Vec2::ZERO));
+        }
+    }
 }

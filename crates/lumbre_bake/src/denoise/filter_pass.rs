@@ -12,7 +12,8 @@ pub(crate) const BIAS: usize = VALUES;
 pub(crate) struct FilterPass {
     /// The distance in texels at which a neighbour has weight e⁻¹.
     pub width: f32,
-    /// Where other surfaces are near, that distance is less than their harmonic mean distance divided by this.
+    /// Where other surfaces are near, that distance is less than their harmonic mean distance divided by this, in the
+    /// directions in which they are near.
     pub near: f32,
     /// The reach, in steps, of the means by which edges are detected.
     pub guide_steps: usize,

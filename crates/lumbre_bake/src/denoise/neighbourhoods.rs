@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::box_sums::BoxSums;
 use super::surface::{NONE, Surface};
 use super::texel_rows::{ChannelRows, TexelRows};
-use crate::coverage::footprint::{Texel, open_texels};
+use crate::coverage::footprint::{MapAxes, Texel, open_texels};
 use crate::scene::{BakeScene, LightmapLayout};
 
 /// The neighbourhoods of all covered texels.
@@ -68,9 +68,9 @@ impl<'a> Neighbourhoods<'a> {
         Self { scene, texels, covered, grid, texel_charts, first_rows, row_starts }
     }
 
-    /// Length of a texel's side on its surface, canonical units.
-    pub fn texel_side(&self, texel: &Texel) -> f32 {
-        texel.side(self.scene)
+    /// How the map lies on a texel's surface.
+    pub fn map_axes(&self, index: usize) -> MapAxes {
+        self.texels[index].map_axes(self.scene)
     }
 
     /// The rows of all maps.

@@ -22,6 +22,7 @@ use super::replicates::Estimates;
 use super::smoothing_bias::{Products, squared_bias};
 use super::texel_rows::{ChannelRows, TexelRows};
 use super::weighted_fit::Fit;
+use crate::coverage::footprint::MapAxes;
 
 /// The first pass reaches a few texels, almost whatever is near. Its `bias_noise`: a replicate has four times the
 /// variance of the texel's mean, a block of 3 x 3 a ninth of that, and the radius of the bias holds 49 / 9 blocks,
@@ -39,11 +40,8 @@ pub(crate) fn smooth(
     nearness: &[Nearness],
 ) -> (Vec<Estimates>, Vec<f32>) {
     let grid = neighbourhoods.grid();
-    let nearness: ChannelRows<3> = neighbourhoods.fill(|index| {
-        let side = neighbourhoods.texel_side(&neighbourhoods.texels[index]);
-        let Nearness { xx, xy, yy } = nearness[index].scaled(side);
-        [xx, xy, yy]
-    });
+    let nearness: ChannelRows<NEARNESS> =
+        neighbourhoods.fill(|index| nearness_channels(nearness[index], &neighbourhoods.map_axes(index)));
     let mut smoothed: Smoothed = neighbourhoods.fill(|index| {
         let estimates = &estimates[index];
         std::array::from_fn(|place| if place < BIAS { estimates[place / 3][place % 3] } else { 0.0 })
@@ -59,12 +57,12 @@ pub(crate) fn smooth(
     (smoothed, biases)
 }
 
-/// Both passes, in place. `nearness` holds that of each texel, times the texel's side.
-fn smooth_rows(grid: &TexelRows, nearness: ChannelRows<3>, estimates: &mut Smoothed) {
-    let reach = grid.compute(&SquaredNearness(&nearness));
+/// Both passes, in place. `nearness` holds the channels of [`nearness_channels`].
+fn smooth_rows(grid: &TexelRows, nearness: ChannelRows<NEARNESS>, estimates: &mut Smoothed) {
+    let squared_nearness = grid.compute(&SquaredNearness(&nearness));
     drop(nearness);
-    FIRST.smooth::<1, 7>(grid, estimates, &reach);
-    SECOND.smooth::<3, 9>(grid, estimates, &reach);
+    FIRST.smooth::<1, 7>(grid, estimates, &squared_nearness);
+    SECOND.smooth::<3, 9>(grid, estimates, &squared_nearness);
 }
 
 impl FilterPass {
@@ -74,13 +72,13 @@ impl FilterPass {
         &self,
         grid: &TexelRows,
         estimates: &mut Smoothed,
-        nearness: &ChannelRows<3>,
+        squared_nearness: &ChannelRows<3>,
     ) {
         let variances = grid.compute(&Variances(estimates));
         let features =
             grid.compute(&Features::<STEP> { steps: self.guide_steps, estimates, variances: &variances });
         drop(variances);
-        let fit = Fit::<STEP, COLUMNS> { pass: self, estimates, nearness, features: &features };
+        let fit = Fit::<STEP, COLUMNS> { pass: self, estimates, squared_nearness, features: &features };
         let smoothed = grid.compute(&fit);
         let products = grid.compute(&Products::<STEP> { raw: estimates, smoothed: &smoothed });
         let choice =
@@ -89,9 +87,22 @@ impl FilterPass {
     }
 }
 
-/// How near other surfaces are around a texel, by direction: the square of the matrix of nearness, so that its value in
-/// a direction is the square of the texel's side over the harmonic mean distance.
-struct SquaredNearness<'a>(&'a ChannelRows<3>);
+/// Channels of a texel's nearness, and of its map's steps from one column and from one row to the next.
+const NEARNESS: usize = 6;
+
+/// The step from one column to the next has no part across itself.
+fn nearness_channels(nearness: Nearness, axes: &MapAxes) -> [f32; NEARNESS] {
+    let Nearness { xx, xy, yy } = nearness;
+    [xx, xy, yy, axes.column_step.x, axes.row_step.x, axes.row_step.y]
+}
+
+/// The largest squared nearness: that of a surface in a millionth of a texel's side.
+const MAX_SQUARED_NEARNESS: f32 = 1e12;
+
+/// How near other surfaces are around a texel, for steps over its map: the matrix of which the value for a step of x
+/// columns and y rows, `xx x² + 2 xy x y + yy y²`, is the square of the step's length across those surfaces over their
+/// harmonic mean distance.
+struct SquaredNearness<'a>(&'a ChannelRows<NEARNESS>);
 
 impl Kernel<3> for SquaredNearness<'_> {
     #[inline(always)]
@@ -100,11 +111,26 @@ impl Kernel<3> for SquaredNearness<'_> {
             #[inline(always)]
             |channel| block.mean(self.0, channel, NOISE_STEPS, 1),
         );
-        let squared = [xx * xx + xy * xy, xy * (xx + yy), xy * xy + yy * yy];
-        let is_finite = (squared[0] + squared[2]).simd_lt(f32::INFINITY);
+        let [column, row_along, row_across] = [3, 4, 5].map(
+            #[inline(always)]
+            |channel| block.center(self.0, channel),
+        );
+        // The products of the matrix with both steps; their products are the square.
+        let (column_x, column_y) = (xx * column, xy * column);
+        let (row_x, row_y) = (xx * row_along + xy * row_across, xy * row_along + yy * row_across);
+        let squared = [
+            column_x * column_x + column_y * column_y,
+            column_x * row_x + column_y * row_y,
+            row_x * row_x + row_y * row_y,
+        ];
+        let trace = squared[0] + squared[2];
+        let zero = block.simd.splat_f32x8(0.0);
+        let limit = block.simd.splat_f32x8(MAX_SQUARED_NEARNESS);
+        let is_finite = trace.simd_lt(f32::INFINITY);
+        let scale = limit / trace.max(limit);
         squared.map(
             #[inline(always)]
-            |value| is_finite.select(value, block.simd.splat_f32x8(0.0)),
+            |value| is_finite.select(value * scale, zero),
         )
     }
 }
@@ -145,6 +171,7 @@ impl<const STEP: usize> Kernel<{ VALUES + 1 }> for Choice<'_, STEP> {
 #[cfg(test)]
 mod tests {
     use fearless_simd::Level;
+    use glam::Vec2;
 
     use super::super::neighbours::tests::{random_channels, random_grid};
     use super::super::surface::Surface;
@@ -169,25 +196,30 @@ mod tests {
         assert!(2 * changed > best.iter().filter(|value| **value != 0.0).count(), "{changed}");
     }
 
-    /// The variance of the smoothed values of the top row over that of the noise, on a plane beside a wall along that
-    /// row. The harmonic mean distance to the wall is a texel's side; `along` is the nearness along the wall.
-    fn remaining_variance(along: f32) -> f32 {
-        let size = (256, 24);
+    const COLUMNS: u32 = 256;
+
+    /// A plane of `COLUMNS` x `rows` texels.
+    fn plane(rows: u32) -> TexelRows {
         let surface = Surface { chart: 0, normal: Vec3::Z, group: 0 };
-        let cells = std::iter::repeat_n(0, (size.0 * size.1) as usize);
-        let grid = TexelRows::new([size].into_iter(), cells, vec![surface]);
-        let mut estimates: Smoothed = random_channels(&grid, 7);
-        let before = top_row(&grid, &estimates);
-        let nearness = grid.fill(|row, _| match row {
-            0..3 => [along, 0.0, 1.0],
-            _ => [0.0; 3],
-        });
-        smooth_rows(&grid, nearness, &mut estimates);
-        variance(&top_row(&grid, &estimates)) / variance(&before)
+        let cells = std::iter::repeat_n(0, (COLUMNS * rows) as usize);
+        TexelRows::new([(COLUMNS, rows)].into_iter(), cells, vec![surface])
     }
 
-    fn top_row(grid: &TexelRows, estimates: &Smoothed) -> Vec<f32> {
-        (0..256).map(|column| grid.get(estimates, 0, column)[0]).collect()
+    /// The variance that smoothing leaves of noise in the top row of a plane, as a fraction, beside a wall along that row
+    /// at a harmonic mean distance of one texel's side. `along` is the nearness along the wall.
+    fn remaining_variance(along: f32) -> f32 {
+        let grid = plane(24);
+        let top_row = |estimates: &Smoothed| -> Vec<f32> {
+            (0..COLUMNS as usize).map(|column| grid.get(estimates, 0, column)[0]).collect()
+        };
+        let mut estimates: Smoothed = random_channels(&grid, 7);
+        let before = top_row(&estimates);
+        let nearness = grid.fill(|row, _| match row {
+            0..3 => [along, 0.0, 1.0, 1.0, 0.0, 1.0],
+            _ => [0.0, 0.0, 0.0, 1.0, 0.0, 1.0],
+        });
+        smooth_rows(&grid, nearness, &mut estimates);
+        variance(&top_row(&estimates)) / variance(&before)
     }
 
     fn variance(values: &[f32]) -> f32 {
@@ -200,5 +232,67 @@ mod tests {
         let (along, nowhere) = (remaining_variance(0.005), remaining_variance(1.0));
         assert!(along < 0.1, "{along}");
         assert!(nowhere > 0.3, "{nowhere}: nothing here keeps smoothing from reaching along the wall");
+    }
+
+    /// The squared nearness for a step of columns and rows of a texel that sees one surface.
+    fn squared_for_step(nearness: Nearness, axes: &MapAxes, [x, y]: [f32; 2]) -> f32 {
+        let grid = plane(1);
+        let squared = grid.compute(&SquaredNearness(&grid.fill(|_, _| nearness_channels(nearness, axes))));
+        let [xx, xy, yy] = grid.get(&squared, 0, 100);
+        xx * x * x + 2.0 * xy * x * y + yy * y * y
+    }
+
+    /// However a map lies on its surface (turned, stretched, sheared or mirrored), only lengths on the surface count.
+    #[test]
+    fn nearness_is_that_of_the_surface_however_the_map_lies_on_it() {
+        let inverse_distance = 4.0;
+        for (turn, stretch, shear) in
+            [(0.0, 1.0, 0.0), (20.0, 3.0, 0.0), (45.0, -0.3, 0.0), (110.0, 2.0, 0.7), (250.0, -1.0, -0.4)]
+        {
+            let along = Vec3::new(f32::cos(turn * 0.0174533), f32::sin(turn * 0.0174533), 0.0);
+            let axes = MapAxes {
+                along,
+                across: Vec3::Z.cross(along),
+                normal: Vec3::Z,
+                column_step: Vec2::new(f32::abs(stretch), 0.0),
+                row_step: Vec2::new(shear, 1.0 / stretch),
+            };
+            let wall = Nearness::of_surface(inverse_distance, Vec3::X, &axes);
+            let ceiling = Nearness::of_surface(inverse_distance, Vec3::NEG_Z, &axes);
+            let lamp = Nearness::of_lamp(inverse_distance);
+            for step in [[1.0, 0.0], [0.0, 1.0], [2.0, 3.0], [-3.0, 1.0]] {
+                let on_surface = axes.column_step * step[0] + axes.row_step * step[1];
+                let on_surface = axes.along * on_surface.x + axes.across * on_surface.y;
+                let lengths = [on_surface.x.abs(), on_surface.length(), on_surface.length()];
+                for (nearness, length) in [wall, ceiling, lamp].into_iter().zip(lengths) {
+                    let ratio = squared_for_step(nearness, &axes, step).sqrt();
+                    // The small part that counts in all directions.
+                    let more = 0.01 * inverse_distance * on_surface.length() + 1e-4;
+                    let least = inverse_distance * length - 1e-3;
+                    assert!(
+                        (least..least + more + 1e-3).contains(&ratio),
+                        "{turn} {stretch} {shear} {step:?}: {ratio} for {length}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn squared_nearness_is_finite_and_negative_in_no_direction() {
+        for inverse_distance in [0.0, 1e-30, 1.0, 1e9, 1e20, f32::MAX, f32::INFINITY, f32::NAN] {
+            let nearness = Nearness { xx: inverse_distance, xy: inverse_distance, yy: inverse_distance };
+            let axes = MapAxes {
+                along: Vec3::X,
+                across: Vec3::Y,
+                normal: Vec3::Z,
+                column_step: Vec2::new(5.0, 0.0),
+                row_step: Vec2::new(0.1, 0.2),
+            };
+            for step in [[1.0, 0.0], [12.0, -12.0], [3.0, 12.0]] {
+                let squared = squared_for_step(nearness, &axes, step);
+                assert!(squared >= -1e-5 * MAX_SQUARED_NEARNESS * 288.0 && squared.is_finite(), "{squared}");
+            }
+        }
     }
 }

@@ -17,8 +17,8 @@ const GUIDE_VARIANCES: f32 = 8.0;
 pub(crate) struct Fit<'a, const STEP: usize, const COLUMNS: usize> {
     pub pass: &'a FilterPass,
     pub estimates: &'a Smoothed,
-    /// Per texel, the square of the matrix of its nearness.
-    pub nearness: &'a ChannelRows<3>,
+    /// Per texel, the matrix of its squared nearness for steps of columns and rows.
+    pub squared_nearness: &'a ChannelRows<3>,
     pub features: &'a ChannelRows<FEATURES>,
 }
 
@@ -34,9 +34,9 @@ impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, C
         let near = self.pass.near * self.pass.near;
         let width = self.pass.width.powi(-2);
         let distance_scales = [
-            block.center(self.nearness, 0) * near + width,
-            block.center(self.nearness, 1) * (2.0 * near),
-            block.center(self.nearness, 2) * near + width,
+            block.center(self.squared_nearness, 0) * near + width,
+            block.center(self.squared_nearness, 1) * (2.0 * near),
+            block.center(self.squared_nearness, 2) * near + width,
         ];
         // The variance of a guide relative to that of a texel's mean: twice as much for a half, divided by the texels
         // averaged.
@@ -104,7 +104,8 @@ impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
             let noise: f32x8<S> = lanes(simd, features[NOISE], at);
             let expected = (center[NOISE] + noise) * *guide_noise;
             let inverse = simd.splat_f32x8(1.0) / expected.max(f32::MIN_POSITIVE);
-            let distance_term = *xx * (x * x) + *xy * (x * y) + *yy * (y * y);
+            // Rounding may make it negative along a surface that is very near.
+            let distance_term = (*xx * (x * x) + *xy * (x * y) + *yy * (y * y)).max(zero);
             let mask = if ON_SURFACE { simd.splat_mask32x8(true) } else { block.neighbour_mask(row, at) };
             for (half, weights) in weights.iter_mut().enumerate() {
                 let mut squares = [zero; 3];
@@ -180,7 +181,7 @@ mod tests {
         });
         let features: ChannelRows<FEATURES> = random_channels(&grid, 3);
         let fit: Fit<'_, 3, 9> =
-            Fit { pass: &pass, estimates: &estimates, nearness: &nearness, features: &features };
+            Fit { pass: &pass, estimates: &estimates, squared_nearness: &nearness, features: &features };
         let fitted = grid.compute(&fit);
         let (mut texels, mut largest) = (0, 0.0f64);
         for row in 0..grid.rows.len() {

@@ -444,8 +444,8 @@ mod tests {
         assert!(opacity < 1.0, "this test sees no fading: {opacity}");
         let mut overlay = Overlay::without_fading();
         for device in 0..2 {
-            let (_, opacity) = texts_and_opacity(&mut overlay, &facts);
-            assert_eq!(opacity, 1.0, "device {device}");
+            let (text, opacity) = texts_and_opacity(&mut overlay, &facts);
+            assert_eq!((text.is_empty(), opacity), (false, 1.0), "device {device}");
             overlay.forget_device();
         }
     }
