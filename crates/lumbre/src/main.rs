@@ -56,7 +56,7 @@ fn main() -> ExitCode {
         // The reader of the output has closed it early, as `head` does; that is no error.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("lumbre: {error:#}");
+            eprintln!("lumbre: {}", message_of(&error));
             ExitCode::FAILURE
         }
     }
@@ -76,6 +76,19 @@ fn messages_shown(arguments: &Arguments) -> Targets {
     })
 }
 
+/// Returns an error's text, followed by those of its causes that it does not contain already: many errors of the
+/// libraries end with the text of their cause.
+fn message_of(error: &anyhow::Error) -> String {
+    let mut message = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !message.contains(&cause) {
+            message.push_str(": ");
+            message.push_str(&cause);
+        }
+    }
+    message
+}
+
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
     let mut causes = error.chain().filter_map(|cause| cause.downcast_ref::<std::io::Error>());
     causes.any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
@@ -88,5 +101,25 @@ fn silence_device_selection() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() && std::env::var_os("NODEVICE_SELECT").is_none() {
         // SAFETY: this is the first thing that `main` does; there is no other thread yet.
         unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::{Context, anyhow};
+
+    use super::message_of;
+
+    #[test]
+    fn a_message_says_every_cause_once() {
+        let error = anyhow!("the disk is full");
+        assert_eq!(message_of(&error), "the disk is full");
+        let error = error.context("a.glb cannot be written: the disk is full; make room");
+        assert_eq!(message_of(&error), "a.glb cannot be written: the disk is full; make room");
+        let error = Err::<(), _>(error).context("the bake is lost").unwrap_err();
+        assert_eq!(
+            message_of(&error),
+            "the bake is lost: a.glb cannot be written: the disk is full; make room"
+        );
     }
 }
