@@ -27,8 +27,9 @@ const TRIANGLE_BYTES: u64 =
     (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32) as u64;
 
 /// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
-/// round, raw and smoothed estimates with their guides, its nearness, sixteen lists of one number each for the errors, its chart, the
-/// light around it, and its block. (The sums of the shared samples of direct light need less, and are freed by then.)
+/// round, raw and smoothed estimates with their guides, its nearness, sixteen lists of one number each for the errors,
+/// its chart, the light around it, and its block. (The sums of the shared samples of direct light need less, and are
+/// freed by then.)
 const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + size_of::<Direct>()
     + 2 * size_of::<GatherSums>()

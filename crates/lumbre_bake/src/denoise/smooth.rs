@@ -249,7 +249,8 @@ mod tests {
         for (turn, stretch, shear) in
             [(0.0, 1.0, 0.0), (20.0, 3.0, 0.0), (45.0, -0.3, 0.0), (110.0, 2.0, 0.7), (250.0, -1.0, -0.4)]
         {
-            let along = Vec3::new(f32::cos(turn * 0.0174533), f32::sin(turn * 0.0174533), 0.0);
+            let (sin, cos) = f32::to_radians(turn).sin_cos();
+            let along = Vec3::new(cos, sin, 0.0);
             let axes = MapAxes {
                 along,
                 across: Vec3::Z.cross(along),
@@ -266,11 +267,11 @@ mod tests {
                 let lengths = [on_surface.x.abs(), on_surface.length(), on_surface.length()];
                 for (nearness, length) in [wall, ceiling, lamp].into_iter().zip(lengths) {
                     let ratio = squared_for_step(nearness, &axes, step).sqrt();
-                    // The small part that counts in all directions.
-                    let more = 0.01 * inverse_distance * on_surface.length() + 1e-4;
-                    let least = inverse_distance * length - 1e-3;
+                    // A part of .005 counts in all directions; the rest is rounding.
+                    let everywhere = 0.005 * inverse_distance * on_surface.length();
+                    let expected = inverse_distance * length;
                     assert!(
-                        (least..least + more + 1e-3).contains(&ratio),
+                        (expected - 1e-3..expected + everywhere + 1e-3).contains(&ratio),
                         "{turn} {stretch} {shear} {step:?}: {ratio} for {length}"
                     );
                 }
@@ -289,9 +290,14 @@ mod tests {
                 column_step: Vec2::new(5.0, 0.0),
                 row_step: Vec2::new(0.1, 0.2),
             };
-            for step in [[1.0, 0.0], [12.0, -12.0], [3.0, 12.0]] {
+            let trace =
+                squared_for_step(nearness, &axes, [1.0, 0.0]) + squared_for_step(nearness, &axes, [0.0, 1.0]);
+            assert!((0.0..1.01 * MAX_SQUARED_NEARNESS).contains(&trace), "{inverse_distance}: {trace}");
+            for step in [[1.0f32, 0.0], [12.0, -12.0], [3.0, 12.0]] {
                 let squared = squared_for_step(nearness, &axes, step);
-                assert!(squared >= -1e-5 * MAX_SQUARED_NEARNESS * 288.0 && squared.is_finite(), "{squared}");
+                // Each of the three terms is rounded to 2⁻²⁴ of at most this.
+                let largest = trace * (step[0] * step[0] + step[1] * step[1]);
+                assert!(squared >= -1e-6 * largest && squared <= 1.01 * largest, "{step:?}: {squared}");
             }
         }
     }
