@@ -33,7 +33,6 @@ macro_rules! modules {
 }
 
 modules!(
-    "behind",
     "deferred_lighting",
     "display",
     "display_color",
@@ -49,6 +48,7 @@ modules!(
     "mirror",
     "normal_map",
     "occlusion_map",
+    "octahedral",
     "refraction",
     "shadow_caster",
     "shadows",

@@ -5,16 +5,19 @@
 //! picture, or the background. Light that is reflected inside a body is lost.
 //!
 //! ```text
-//!   frame so far ──► behind ────────────────────┐
-//!   back faces of bodies ──► back faces ────────┼──► refraction: added to the refractive surfaces
-//!   reflections in flat surfaces (`mirrors`) ───┘
+//!   frame so far ──► copies of its radiance and depths ──┐
+//!   back faces of bodies ──► normals and depths ─────────┼──► refraction: added to the refractive surfaces
+//!   reflections in flat surfaces (`mirrors`) ────────────┘
 //! ```
 
 use std::collections::HashMap;
 
 use bevy_ecs::world::World;
 use glam::Vec3;
-use lumbre_graph::{LoadOp, PassResources, RasterContext, RunError, TextureDescriptor, TextureHandle};
+use lumbre_graph::{
+    LoadOp, PassResources, RasterContext, RunError, TextureDescriptor, TextureHandle, TextureRead,
+    TextureWrite, TransferContext,
+};
 
 use super::mirrors::MirrorPictures;
 use super::surface_uniforms::SurfaceUniforms;
@@ -31,10 +34,10 @@ use crate::shader::{self, Feature};
 use crate::target::DEPTH_FORMAT;
 use crate::{FrameOptions, Gpu, RenderError};
 
-/// Format of the depths behind the surfaces.
-const DEPTHS: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
-/// Format of the normals and depths of back faces.
-const BACK_FACES: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+/// Format of the octahedral normals of back faces.
+const BACK_NORMALS: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
+/// Where there is no back face: NO_DIRECTION of shaders/octahedral.wesl.
+const NO_DIRECTION: wgpu::Color = wgpu::Color { r: 2.0, g: 2.0, b: 0.0, a: 0.0 };
 
 #[derive(Debug, Default)]
 pub(super) struct Refraction {
@@ -51,8 +54,6 @@ pub(super) struct Refraction {
 /// What a pipeline depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Key {
-    /// Copies the frame so far.
-    Behind { format: wgpu::TextureFormat, multisampled: bool },
     /// Draws back faces of objects with this winding.
     BackFaces { mirrored: bool },
     /// Adds the refracted and reflected light.
@@ -62,7 +63,6 @@ enum Key {
 /// The keys of a frame's pipelines.
 #[derive(Clone, Copy, Debug)]
 struct Keys {
-    behind: Key,
     back_faces: [Key; 2],
     surfaces: Key,
 }
@@ -71,14 +71,13 @@ impl Keys {
     fn of(frame: &FrameShape, fog: Option<Feature>) -> Self {
         let (format, samples) = (frame.lit_format, frame.samples);
         Self {
-            behind: Key::Behind { format: frame.linear_format, multisampled: samples > 1 },
             back_faces: [false, true].map(|mirrored| Key::BackFaces { mirrored }),
             surfaces: Key::Surfaces { format, samples, fog },
         }
     }
 
-    fn all(&self) -> [Key; 4] {
-        [self.behind, self.back_faces[0], self.back_faces[1], self.surfaces]
+    fn all(&self) -> [Key; 3] {
+        [self.back_faces[0], self.back_faces[1], self.surfaces]
     }
 }
 
@@ -87,25 +86,26 @@ struct OnDevice {
     layouts: Layouts,
     pipelines: HashMap<Key, Pending<wgpu::RenderPipeline>>,
     surfaces: SurfaceUniforms,
+    /// Bound where no body has back faces; nothing reads it then.
+    no_depth: wgpu::TextureView,
 }
 
 /// Layouts of the bind groups.
 #[derive(Clone, Debug)]
 struct Layouts {
-    /// The frame so far, with one sample per pixel and with several.
-    frame: [wgpu::BindGroupLayout; 2],
     /// A view and the objects.
     view: wgpu::BindGroupLayout,
-    /// A surface, and the pictures in which its rays are traced.
-    surface: wgpu::BindGroupLayout,
+    /// A surface, and the pictures in which its rays are traced: with one sample per pixel and with several.
+    surface: [wgpu::BindGroupLayout; 2],
 }
 
 /// The pictures in which rays are traced.
 #[derive(Clone, Copy, Debug)]
 struct Pictures {
     behind: TextureHandle,
-    depths: TextureHandle,
-    back_faces: TextureHandle,
+    behind_depth: TextureHandle,
+    /// Normals and depths of back faces, if a body has some.
+    back_faces: Option<[TextureHandle; 2]>,
 }
 
 impl Effect for Refraction {
@@ -174,22 +174,23 @@ impl Effect for Refraction {
         let [width, height] = board.size;
         let described = |format| TextureDescriptor::new_2d(width, height, format);
         let mut behind = graph.texture("behind", described(board.linear_format));
-        let mut depths = graph.texture("depths behind", described(DEPTHS));
-        let mut back_faces = graph.texture("back faces", described(BACK_FACES));
+        let several = described(DEPTH_FORMAT).samples(board.samples);
+        let mut behind_depth = graph.texture("depth behind", several);
+        let mut back_normals = graph.texture("normals of back faces", described(BACK_NORMALS));
         let mut back_depth = graph.texture("depth of back faces", described(DEPTH_FORMAT));
         if in_scene && switched_on && in_sight {
-            let (linear, depth) = (board.linear, board.depth);
+            let copies = [(board.linear, behind), (board.depth, behind_depth)];
             graph
-                .raster_pass("behind")
-                .samples(&linear)
-                .samples(&depth)
-                .color(&mut behind, LoadOp::Clear(wgpu::Color::TRANSPARENT))
-                .color(&mut depths, LoadOp::Clear(wgpu::Color::TRANSPARENT))
-                .run(move |context| self.copy_frame(context, &linear, &depth));
+                .transfer_pass("behind")
+                .reads(&board.linear, TextureRead::CopySource)
+                .reads(&board.depth, TextureRead::CopySource)
+                .writes(&mut behind, TextureWrite::CopyDestination)
+                .writes(&mut behind_depth, TextureWrite::CopyDestination)
+                .run(move |context| copy(context, &copies));
             if solid {
                 graph
                     .raster_pass("back faces")
-                    .color(&mut back_faces, LoadOp::Clear(wgpu::Color::TRANSPARENT))
+                    .color(&mut back_normals, LoadOp::Clear(NO_DIRECTION))
                     .depth(&mut back_depth, LoadOp::Clear(0.0))
                     .run(move |context| self.draw_back_faces(context));
             }
@@ -207,13 +208,13 @@ impl Effect for Refraction {
         if in_scene && switched_on && in_sight {
             let mirrored =
                 board.get::<MirrorPictures>().map(|pictures| pictures.0.clone()).unwrap_or_default();
-            let mut pass = board.lit_pass(graph, self.name(), LoadOp::Load).samples(&behind).samples(&depths);
-            if solid {
-                pass = pass.samples(&back_faces);
+            let mut pass =
+                board.lit_pass(graph, self.name(), LoadOp::Load).samples(&behind).samples(&behind_depth);
+            let back_faces = solid.then_some([back_normals, back_depth]);
+            for picture in back_faces.iter().flatten() {
+                pass = pass.samples(picture);
             }
-            // Without solid bodies, any picture takes the place of their back faces, which nothing reads.
-            let back_faces = if solid { back_faces } else { behind };
-            let pictures = Pictures { behind, depths, back_faces };
+            let pictures = Pictures { behind, behind_depth, back_faces };
             for picture in mirrored.values() {
                 pass = pass.samples(picture);
             }
@@ -229,28 +230,6 @@ impl Refraction {
         let device = self.device.as_ref()?;
         let pipeline = device.pipelines.get(&of(self.keys.as_ref()?)).and_then(Pending::get)?.ok()?;
         Some((device, pipeline))
-    }
-
-    fn copy_frame(
-        &self,
-        context: &mut RasterContext<'_, FrameScene<'_>>,
-        linear: &TextureHandle,
-        depth: &TextureHandle,
-    ) -> Result<(), EffectError> {
-        let Some((device, pipeline)) = self.pipeline(|keys| keys.behind) else { return Ok(()) };
-        let views = [context.resources.view(linear)?, context.resources.view(depth)?];
-        let several = context.resources.texture(depth)?.sample_count() > 1;
-        let layout = &device.layouts.frame[usize::from(several)];
-        let group = group(
-            context.resources.device,
-            "frame so far",
-            layout,
-            &views.map(wgpu::BindingResource::TextureView),
-        );
-        context.pass.set_pipeline(pipeline);
-        context.pass.set_bind_group(0, &group, &[]);
-        context.pass.draw(0..3, 0..1);
-        Ok(())
     }
 
     fn draw_back_faces(&self, context: &mut RasterContext<'_, FrameScene<'_>>) -> Result<(), EffectError> {
@@ -308,6 +287,18 @@ impl Refraction {
     }
 }
 
+/// Copies whole textures to others of the same size.
+fn copy(
+    context: &mut TransferContext<'_, FrameScene<'_>>,
+    copies: &[(TextureHandle, TextureHandle)],
+) -> Result<(), EffectError> {
+    for (from, to) in copies {
+        let [from, to] = [context.resources.texture(from)?, context.resources.texture(to)?];
+        context.encoder.copy_texture_to_texture(from.as_image_copy(), to.as_image_copy(), from.size());
+    }
+    Ok(())
+}
+
 fn group(
     device: &wgpu::Device,
     label: &str,
@@ -323,10 +314,21 @@ fn group(
 
 impl OnDevice {
     fn new(gpu: &Gpu) -> Self {
+        let no_depth = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("no back faces"),
+            size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: DEPTH_FORMAT,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
         Self {
             layouts: Layouts::new(&gpu.device),
             pipelines: HashMap::new(),
             surfaces: SurfaceUniforms::default(),
+            no_depth: no_depth.create_view(&Default::default()),
         }
     }
 
@@ -347,15 +349,24 @@ impl OnDevice {
         mirrored: &TextureHandle,
     ) -> Result<Option<wgpu::BindGroup>, RunError> {
         let Some(surface) = self.surfaces.binding::<RefractorData>() else { return Ok(None) };
-        let picture = |handle| resources.view(handle).map(wgpu::BindingResource::TextureView);
+        let view = |handle| resources.view(handle);
+        let back_faces = match &pictures.back_faces {
+            Some([normals, depths]) => [view(normals)?, view(depths)?],
+            None => [view(&pictures.behind)?, &self.no_depth],
+        };
+        let [normals, depths] = back_faces.map(wgpu::BindingResource::TextureView);
+        let picture = |handle| view(handle).map(wgpu::BindingResource::TextureView);
+        let several = resources.texture(&pictures.behind_depth)?.sample_count() > 1;
         let bound = [
             surface,
             picture(&pictures.behind)?,
-            picture(&pictures.depths)?,
-            picture(&pictures.back_faces)?,
+            picture(&pictures.behind_depth)?,
+            normals,
+            depths,
             picture(mirrored)?,
         ];
-        Ok(Some(group(resources.device, "refraction", &self.layouts.surface, &bound)))
+        let layout = &self.layouts.surface[usize::from(several)];
+        Ok(Some(group(resources.device, "refraction", layout, &bound)))
     }
 }
 
@@ -387,21 +398,14 @@ impl Layouts {
         debug_assert_eq!([FrameBuffer::Frame.binding(), FrameBuffer::Objects.binding()], [0, 1]);
         let uniform = |dynamic| buffer(wgpu::BufferBindingType::Uniform, dynamic);
         let transforms = buffer(wgpu::BufferBindingType::Storage { read_only: true }, false);
-        let depth = |multisampled| (fragment, texture(wgpu::TextureSampleType::Depth, multisampled));
+        let depth = |multisampled| texture(wgpu::TextureSampleType::Depth, multisampled);
         Self {
-            frame: [false, true]
-                .map(|several| layout("frame so far", &[(fragment, color()), depth(several)])),
             view: layout("view of refraction", &[(vertex | fragment, uniform(false)), (vertex, transforms)]),
-            surface: layout(
-                "refraction",
-                &[
-                    (fragment, uniform(true)),
-                    (fragment, color()),
-                    (fragment, color()),
-                    (fragment, color()),
-                    (fragment, color()),
-                ],
-            ),
+            surface: [false, true].map(|several| {
+                let pictures = [color(), depth(several), color(), depth(false), color()];
+                let all = [uniform(true)].into_iter().chain(pictures);
+                layout("refraction", &all.map(|ty| (fragment, ty)).collect::<Vec<_>>())
+            }),
         }
     }
 }
@@ -424,29 +428,25 @@ fn make(device: &wgpu::Device, layouts: &Layouts, key: Key) -> Result<wgpu::Rend
     let add = Some(wgpu::BlendState { color: add, alpha: add });
     let mut primitive = wgpu::PrimitiveState::default();
     let mut samples = 1;
-    let (root, entry, flags, groups, targets, depth_stencil) = match key {
-        Key::Behind { format, multisampled } => {
-            let flags = vec![("MULTISAMPLED", multisampled)];
-            let layouts = vec![Some(&layouts.frame[usize::from(multisampled)])];
-            ("behind", "fragment", flags, layouts, vec![target(format, None), target(DEPTHS, None)], None)
-        }
+    let (entry, fog, groups, target, depth_stencil) = match key {
         Key::BackFaces { mirrored } => {
             primitive.front_face = if mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw };
             primitive.cull_mode = Some(wgpu::Face::Front);
             let nearest = depth(true, wgpu::CompareFunction::Greater);
-            let targets = vec![target(BACK_FACES, None)];
-            ("refraction", "back_face", fog_flags(None), vec![Some(&layouts.view)], targets, Some(nearest))
+            ("back_face", None, vec![Some(&layouts.view)], target(BACK_NORMALS, None), nearest)
         }
         Key::Surfaces { format, samples: several, fog } => {
             samples = several;
             let here = depth(false, wgpu::CompareFunction::Equal);
-            let layouts = vec![Some(&layouts.view), Some(&layouts.surface)];
-            ("refraction", "fragment", fog_flags(fog), layouts, vec![target(format, add)], Some(here))
+            let layouts = vec![Some(&layouts.view), Some(&layouts.surface[usize::from(several > 1)])];
+            ("fragment", fog, layouts, target(format, add), here)
         }
     };
-    let module = shader::compile(device, root, &flags)?;
+    let mut flags = fog_flags(fog);
+    flags.push(("MULTISAMPLED", samples > 1));
+    let module = shader::compile(device, "refraction", &flags)?;
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(root),
+        label: Some("refraction"),
         bind_group_layouts: &groups,
         immediate_size: 0,
     });
@@ -462,22 +462,22 @@ fn make(device: &wgpu::Device, layouts: &Layouts, key: Key) -> Result<wgpu::Rend
         })
     });
     Ok(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(root),
+        label: Some("refraction"),
         layout: Some(&pipeline_layout),
         vertex: wgpu::VertexState {
             module: &module,
             entry_point: Some("vertex"),
             compilation_options: Default::default(),
-            buffers: if matches!(key, Key::Behind { .. }) { &[] } else { &shape },
+            buffers: &shape,
         },
         primitive,
-        depth_stencil,
+        depth_stencil: Some(depth_stencil),
         multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
         fragment: Some(wgpu::FragmentState {
             module: &module,
             entry_point: Some(entry),
             compilation_options: Default::default(),
-            targets: &targets,
+            targets: &[target],
         }),
         multiview_mask: None,
         cache: None,
