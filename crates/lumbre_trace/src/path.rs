@@ -60,8 +60,19 @@ struct Walk {
     last: Option<Scattering>,
     reflections: u32,
     rays: u32,
-    /// Whether it has met nothing so far but thin sheets and partly covering surfaces.
-    first: bool,
+    fog: FogBegins,
+}
+
+/// Where the fog on a path's current ray begins. As in frames and ray trees, it lies before what is seen:
+/// directly, in mirrors and through glass. Light between the surfaces themselves passes it undimmed.
+#[derive(Clone, Copy)]
+enum FogBegins {
+    /// At the eye; the fog is that of a frame, which depends on the depth.
+    AtTheEye,
+    /// This many metres before the start of the ray, where the path was last reflected or refracted.
+    Before(f64),
+    /// The path has been scattered.
+    Nowhere,
 }
 
 /// A point at which the path's direction was sampled.
@@ -107,7 +118,7 @@ impl<'a> Paths<'a> {
             last: None,
             reflections: 0,
             rays: 0,
-            first: true,
+            fog: FogBegins::AtTheEye,
         };
         for _ in 0..MAX_SURFACES {
             if self.step(&mut walk, numbers) == Next::Ends {
@@ -142,11 +153,12 @@ impl<'a> Paths<'a> {
         walk.throughput *= walk.media.transmittance(point.distance);
         let since = walk.last.map_or(0.0, |last| last.distance) + point.distance;
         if point.coverage < 1.0 && numbers.next() >= point.coverage {
+            if let FogBegins::Before(metres) = &mut walk.fog {
+                *metres += point.distance;
+            }
             return walk.goes_straight(&point, since);
         }
-        if walk.first {
-            self.add_fog(walk, &point);
-        }
+        self.add_fog(walk, &point);
         if object.material.unlit {
             if is_specular {
                 walk.brings(Source::Object(point.object), walk.reflections, point.surface.diffuse);
@@ -160,11 +172,17 @@ impl<'a> Paths<'a> {
         self.scatter(walk, &point, since, numbers)
     }
 
-    /// Adds the fog between the eye and what it sees, as frames have it.
+    /// Adds the fog before a surface.
     fn add_fog(&self, walk: &mut Walk, point: &SurfacePoint) {
         let Some(fog) = &self.scene.settings.fog else { return };
-        let clear = fog_weight(&fog.mode, self.camera.depth(point.position));
-        walk.brings(Source::Background, 0, apply_fog(clear, DVec3::ZERO, fog.color.as_dvec3()));
+        let distance = match walk.fog {
+            FogBegins::AtTheEye => self.camera.depth(point.position),
+            FogBegins::Before(metres) => metres + point.distance,
+            FogBegins::Nowhere => return,
+        };
+        let clear = fog_weight(&fog.mode, distance);
+        let color = apply_fog(clear, DVec3::ZERO, fog.color.as_dvec3());
+        walk.brings(Source::Background, walk.reflections, color);
         walk.throughput *= clear;
     }
 
@@ -222,6 +240,9 @@ impl<'a> Paths<'a> {
             } else {
                 walk.throughput *= split.transmitted * (total / through);
                 if object.medium.thin {
+                    if !matches!(walk.fog, FogBegins::Nowhere) {
+                        walk.fog = FogBegins::Before(0.0);
+                    }
                     return walk.goes_straight(point, since);
                 }
                 // Refraction changes the solid angle of a beam, and its radiance with it, by 1/η².
@@ -341,7 +362,8 @@ impl Walk {
         self.farthest = f64::INFINITY;
         self.last = scattering;
         self.reflections += 1;
-        self.first = false;
+        let scattered = self.last.is_some() || matches!(self.fog, FogBegins::Nowhere);
+        self.fog = if scattered { FogBegins::Nowhere } else { FogBegins::Before(0.0) };
         if self.throughput.max_element() <= 0.0 || !self.throughput.is_finite() {
             return Next::Ends;
         }
@@ -381,7 +403,7 @@ mod tests {
                     last: None,
                     reflections: SAFE_DEPTH,
                     rays: 0,
-                    first: false,
+                    fog: FogBegins::Before(0.0),
                 };
                 let next = walk.turns(ray, None, &mut Numbers::new(1, 0, sample));
                 assert!(next == Next::Ends || walk.throughput.x >= throughput);

@@ -80,6 +80,9 @@ struct Twig<'m> {
     turns: u32,
     /// Whether it is the camera ray, or its straight continuation behind a partly covering surface.
     first: bool,
+    /// Metres from the last surface that reflected or refracted it to its start, which is behind a partly
+    /// covering surface if they are not 0.
+    passed: f64,
 }
 
 impl RayTree<'_> {
@@ -94,7 +97,8 @@ impl RayTree<'_> {
     ) -> Seen {
         let mut seen = Seen { terms, ..Seen::default() };
         let mut left = self.limits.rays;
-        let root = Twig { ray, farthest, media, weight: DVec3::ONE, depth: 0, turns: 0, first: true };
+        let root =
+            Twig { ray, farthest, media, weight: DVec3::ONE, depth: 0, turns: 0, first: true, passed: 0.0 };
         seen.radiance = self.radiance(root, &mut left, &mut seen, record);
         seen
     }
@@ -140,7 +144,8 @@ impl RayTree<'_> {
             self.lit(&twig, &point, clear, left, seen, record.as_deref_mut())
         };
         if let Some(fog) = &scene.settings.fog {
-            let distance = if twig.first { self.camera.depth(point.position) } else { point.distance };
+            let distance =
+                if twig.first { self.camera.depth(point.position) } else { twig.passed + point.distance };
             let (weight, color) = (fog_weight(&fog.mode, distance), fog.color.as_dvec3());
             radiance = apply_fog(weight, radiance, color);
             seen.meets(color, DVec3::ZERO);
@@ -156,6 +161,7 @@ impl RayTree<'_> {
                 farthest: twig.farthest - point.distance,
                 media: twig.media,
                 weight: twig.weight * behind * clear,
+                passed: twig.passed + point.distance,
                 ..twig
             };
             radiance = radiance * point.coverage
@@ -211,6 +217,7 @@ impl RayTree<'_> {
                 depth: twig.depth + 1,
                 turns: twig.turns + 1,
                 first: false,
+                passed: 0.0,
             };
             radiance +=
                 self.branch_off(Kind::Mirrored, next, split.mirrored, left, seen, record.as_deref_mut());
@@ -224,6 +231,7 @@ impl RayTree<'_> {
                 depth: twig.depth + 1,
                 turns: twig.turns + u32::from(!object.medium.thin),
                 first: false,
+                passed: 0.0,
             };
             radiance += self.branch_off(Kind::Transmitted, next, split.transmitted, left, seen, record);
         }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::{Light, Material};
+use lumbre_optics::{AlphaMode, Fog, FogMode, Light, Material};
 use lumbre_scene::{Medium, Mesh, Quadric, QuadricShape, SceneSettings, Transform};
 use lumbre_trace::{Kind, TraceOptions};
 
@@ -371,4 +371,51 @@ fn nothing_to_trace_is_the_background() {
         picture.radiance.iter().all(|pixel| (*pixel - Vec3::new(0.1, 0.2, 0.3).as_dvec3()).length() == 0.0)
     );
     assert_eq!(report.rays, 16);
+}
+
+/// Spawns a square of 40 m at this height along z, which faces `toward`.
+fn square(world: &mut World, z: f64, toward: DVec3, material: Material) -> Entity {
+    let place = Transform::from_xyz(0.0, 0.0, z).with_rotation(DQuat::from_rotation_arc(DVec3::Y, toward));
+    world.spawn((Mesh(Arc::new(shapes::plane(40.0, 40.0, 1, 1))), material, place)).id()
+}
+
+/// A wall that emits 1 behind the camera, 6 m from the mirror that the camera sees at 2 m, in fog that
+/// leaves exp(-.3 d): a mirror, a sheet before it, and a half covering pane between it and the wall.
+#[test]
+fn fog_lies_before_what_is_seen_in_mirrors_and_through_panes() {
+    let color = Vec3::new(0.2, 0.4, 0.9);
+    let clear = |metres: f64| (-0.3 * metres).exp();
+    let fogged = |radiance: DVec3, metres: f64| {
+        radiance * clear(metres) + color.as_dvec3() * (1.0 - clear(metres))
+    };
+    let wall = |metres: f64| fogged(DVec3::ONE, metres);
+    let pane = Material { alpha: 0.5, alpha_mode: AlphaMode::Blend, ..black() };
+    let sheet = Material { transmission: Vec3::ONE, ..black() };
+    let half_covered = 0.5 * fogged(DVec3::ZERO, 3.0) + 0.5 * wall(6.0);
+    for (name, between, before, expected) in [
+        ("mirror", None, false, fogged(wall(6.0), 2.0)),
+        ("pane in the mirror", Some(pane), false, fogged(half_covered, 2.0)),
+        // The light passes the sheet on its way to the mirror, too.
+        ("sheet before the mirror", None, true, fogged(fogged(fogged(wall(5.0), 1.0), 1.0), 1.0)),
+    ] {
+        let mut world = World::new();
+        let fog = Fog { mode: FogMode::Exponential { density: 0.3 }, color };
+        world.insert_resource(SceneSettings { fog: Some(fog), ..SceneSettings::default() });
+        square(&mut world, 0.0, DVec3::Z, mirror(1.0));
+        square(&mut world, 6.0, DVec3::NEG_Z, glowing(1.0, 0.0));
+        if let Some(pane) = between {
+            square(&mut world, 3.0, DVec3::NEG_Z, pane);
+        }
+        if before {
+            let sheet = square(&mut world, 1.0, DVec3::Z, sheet.clone());
+            world.entity_mut(sheet).insert(Medium { thin: true, ..Medium::default() });
+        }
+        camera(&mut world, DVec3::new(0.0, 0.0, 2.0), DVec3::ZERO, 1e-4);
+        let seen = tree(&mut world, &options(16)).radiance;
+        assert!((seen - expected).abs().max_element() < 1e-6, "{name}: {seen} for {expected}");
+        let (picture, report) = draw(&mut world, &paths(16, 256));
+        let mean = picture.radiance.iter().sum::<DVec3>() / picture.radiance.len() as f64;
+        let error = report.standard_error.expect("there are passes enough") / 16.0;
+        assert!((mean - expected).abs().max_element() < 5.0 * error + 1e-6, "{name}: {mean} for {expected}");
+    }
 }
