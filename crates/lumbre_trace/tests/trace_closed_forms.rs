@@ -385,9 +385,8 @@ fn square(world: &mut World, z: f64, toward: DVec3, material: Material) -> Entit
 fn fog_lies_before_what_is_seen_in_mirrors_and_through_panes() {
     let color = Vec3::new(0.2, 0.4, 0.9);
     let clear = |metres: f64| (-0.3 * metres).exp();
-    let fogged = |radiance: DVec3, metres: f64| {
-        radiance * clear(metres) + color.as_dvec3() * (1.0 - clear(metres))
-    };
+    let fogged =
+        |radiance: DVec3, metres: f64| radiance * clear(metres) + color.as_dvec3() * (1.0 - clear(metres));
     let wall = |metres: f64| fogged(DVec3::ONE, metres);
     let pane = Material { alpha: 0.5, alpha_mode: AlphaMode::Blend, ..black() };
     let sheet = Material { transmission: Vec3::ONE, ..black() };

@@ -81,7 +81,7 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind {
         name: "tour",
         about: "the frames of all cameras, compared with the ray tree",
-        method: 2,
+        method: 3,
         run: tour::run,
     },
     StudyKind {

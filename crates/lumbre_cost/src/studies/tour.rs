@@ -1,10 +1,11 @@
 //! Study of the frames of every camera compared with the ray tree: how large their errors are, and which
-//! effect would remove most of it. Interreflected light is studied in `light_transport`.
+//! change would reduce them most. The ray tree is averaged over each pixel, because a reference of one ray per
+//! pixel would show the same jagged edges as a frame, and count smooth ones as an error. Interreflected light is studied in `light_transport`.
 
 use bevy_ecs::prelude::*;
 use lumbre_optics::{Light, LightKind, Shading};
 use lumbre_render::FrameOptions;
-use lumbre_scene::{Camera, Name};
+use lumbre_scene::{Camera, FrameSettings, Name, SceneSettings};
 use lumbre_trace::TraceOptions;
 
 use super::over_scenes_made;
@@ -13,14 +14,18 @@ use crate::findings::{milliseconds, percent};
 use crate::frame::Frame;
 use crate::frames::draw_frames;
 use crate::measured::Measured;
+use crate::picture::compared;
 use crate::scene_file::SceneFile;
 use crate::scenes::mirror_and_glass;
 use crate::traced::{ray_tree, traced_world};
-use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
+use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Study};
 
 /// Largest number of cameras of a file that are measured.
 const MAX_CAMERAS: usize = 16;
 const FEW_CAMERAS: usize = 1;
+/// Rays per pixel of the reference.
+const SAMPLES: u32 = 64;
+const FEW_SAMPLES: u32 = 16;
 /// Seconds for the frames of one camera.
 const SECONDS: f64 = 4.0;
 
@@ -49,16 +54,28 @@ const CHANGES: &[Change] = &[
         apply: |world, _| every_lamp_casts(world),
     },
     Change {
+        name: "shadow maps of four times the resolution",
+        arguments: " --shadow-resolution 4",
+        apply: |world, _| frame_settings(world, |frame| frame.shadow_resolution = 4.0),
+    },
+    Change {
+        name: "four samples per pixel",
+        arguments: " --msaa",
+        apply: |_, options| options.multisample = Some(true),
+    },
+    Change {
         name: "mirrors four deep",
         arguments: " --mirror-depth 4",
         apply: |_, options| options.mirror_depth = 4,
     },
     Change {
         name: EVERYTHING,
-        arguments: " --every-shadow --shading phong --mirror-depth 4",
+        arguments: " --every-shadow --shadow-resolution 4 --shading phong --mirror-depth 4 --msaa",
         apply: |world, options| {
             every_lamp_casts(world);
+            frame_settings(world, |frame| frame.shadow_resolution = 4.0);
             (options.shading, options.mirror_depth) = (Some(Shading::Phong), 4);
+            options.multisample = Some(true);
         },
     },
     Change {
@@ -74,22 +91,29 @@ fn every_lamp_casts(world: &mut World) {
     lamps.for_each(|mut light| light.shadow = true);
 }
 
+fn frame_settings(world: &mut World, change: fn(&mut FrameSettings)) {
+    change(&mut world.get_resource_or_insert_with(SceneSettings::default).frame);
+}
+
 /// Runs the study.
 ///
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    over_scenes_made(conditions, study(), ("mirror-and-glass", mirror_and_glass), |scene, told, measured| {
-        of_scene(conditions, scene, told, measured)
-    })
+    over_scenes_made(
+        conditions,
+        study(conditions),
+        ("mirror-and-glass", mirror_and_glass),
+        |scene, told, measured| of_scene(conditions, scene, told, measured),
+    )
 }
 
-fn study() -> Study {
+fn study(conditions: &Conditions<'_>) -> Study {
     Study {
         name: "tour".into(),
         title: "Tour of the cameras".into(),
-        question: "How large are the errors of the frames of a scene's cameras compared with the ray tree, which has shadows, mirrors and glass? Which effect would remove most of each error, and at what cost?".into(),
-        reference: "the documents' ray tree, with one ray through the centre of every pixel".into(),
+        question: "How large are the errors of the frames of a scene's cameras compared with the ray tree, which has shadows, mirrors and glass? Which single change would reduce each error most, and at what cost?".into(),
+        reference: format!("the documents' ray tree, the mean of {} rays per pixel", samples(conditions)),
         plots: vec![Plot {
             title: "Error over time".into(),
             across: Quantity::Milliseconds,
@@ -99,6 +123,10 @@ fn study() -> Study {
         }],
         ..Study::default()
     }
+}
+
+fn samples(conditions: &Conditions<'_>) -> u32 {
+    conditions.unless_quick(SAMPLES, FEW_SAMPLES)
 }
 
 /// Returns the cameras of a scene with their names, or with their numbers if they have none.
@@ -165,7 +193,16 @@ fn of_camera(
         Ok((world, camera))
     };
     let (mut world, camera) = opened()?;
-    let (exact, _) = traced_world(conditions, &mut world, &TraceOptions { camera, ..ray_tree(conditions) })?;
+    let samples = samples(conditions);
+    let mut exact = |samples| {
+        let options = TraceOptions { camera, samples: Some(samples), ..ray_tree(conditions) };
+        traced_world(conditions, &mut world, &options).map(|(picture, _)| picture)
+    };
+    let (exact, rough) = (exact(samples)?, exact(samples / 4)?);
+    // Were the samples random, the variance of the difference would be three times that of the mean of all
+    // samples. Evenly spread ones are better than that.
+    let differ = compared(&exact, &rough, ErrorOver::Picture).map_or(0.0, |found| found.error.relative_rmse);
+    let uncertainty = differ / f64::sqrt(3.0);
     let reference = measured.keep_reference(&format!("{} {stop} by rays", scene.name), exact);
     let middle = before + 0.3 * (after - before);
     conditions.tell(middle)?;
@@ -182,6 +219,7 @@ fn of_camera(
             series: scene.series(conditions, stop),
             label: change.name.to_owned(),
             milliseconds: frame.spread(),
+            error: Some(ErrorOf { uncertainty, ..ErrorOf::default() }),
             counts: frame.counts(),
             command: conditions
                 .drawing(scene.in_commands(), &format!(" --camera {}{}", quoted(stop), change.arguments)),
@@ -193,7 +231,7 @@ fn of_camera(
 }
 
 /// Returns the finding about one camera, whose points are in the order of [`CHANGES`], and the single change
-/// that removes most of the error.
+/// that reduces the error most.
 fn findings(stop: &str, points: &[Point]) -> (Vec<String>, Option<usize>) {
     let error = |place: usize| points.get(place)?.error.map(|error| error.relative_rmse);
     let time = |place: usize| points.get(place)?.milliseconds;
@@ -201,26 +239,29 @@ fn findings(stop: &str, points: &[Point]) -> (Vec<String>, Option<usize>) {
     else {
         return (Vec::new(), None);
     };
+    let uncertain = points.first().and_then(|point| point.error).map_or(0.0, |error| error.uncertainty);
     let single = (1..everything).filter_map(|place| Some((place, error(place)?)));
-    let best = single.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, left)| *left < 0.99 * now);
+    let best = single
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .filter(|(_, left)| *left < (0.99 * now).min(now - uncertain));
     let price = |place: usize| match (time(0), time(place)) {
         (Some(now), Some(then)) => format!(" ({} instead of {})", milliseconds(&then), milliseconds(&now)),
         _ => String::new(),
     };
-    let mut said = format!("{stop}: the frame has an error of {}", percent(now));
+    let mut said = format!("{stop}: the frame has an error of {} (± {})", percent(now), percent(uncertain));
     match best {
         Some((place, left)) => {
             said += &format!(
-                "; the change \"{}\" would remove most of it and leave {}{}",
+                "; the single change that reduces it most is \"{}\", which leaves {}{}",
                 CHANGES[place].name,
                 percent(left),
                 price(place)
             );
         }
-        None => said += "; no effect of a frame would remove much of it",
+        None => said += "; no single change reduces it by more than a hundredth or the uncertainty",
     }
     if let Some(left) = error(everything) {
-        said += &format!("; all effects together leave {}", percent(left));
+        said += &format!("; all changes together leave {}", percent(left));
     }
     let without = points.iter().position(|point| point.label == WITHOUT);
     if let Some(bare) = without.and_then(error).filter(|bare| *bare > 1.01 * now) {
