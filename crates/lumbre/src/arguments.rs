@@ -393,8 +393,8 @@ pub struct Trace {
     #[arg(long)]
     pub sample_by_noise: bool,
     /// Auxiliary pictures, as layers of an .exr, or as separate files beside a .png: albedo, normal, depth,
-    /// rays, direct, indirect, and light:NAME, direct:NAME, indirect:NAME for the light of one source; * as
-    /// NAME for every source.
+    /// rays, standard-error, direct, indirect, and light:NAME, direct:NAME, indirect:NAME for the light of one
+    /// source; * as NAME for every source.
     #[arg(long, value_name = "NAME[,NAME…]", value_delimiter = ',', value_parser = aov, conflicts_with = "pixel")]
     pub aov: Vec<Aov>,
     /// Continue with the paths that an earlier run has kept in OUT.samples, if it exists, and keep them there
@@ -781,7 +781,7 @@ fn integrator(text: &str) -> Result<Integrator, String> {
 
 fn aov(text: &str) -> Result<Aov, String> {
     Aov::from_name(text).ok_or_else(|| {
-        "there are albedo, normal, depth, rays, direct, indirect, light:NAME, direct:NAME, indirect:NAME"
+        "there are albedo, normal, depth, rays, standard-error, direct, indirect, light:NAME, direct:NAME, indirect:NAME"
             .to_owned()
     })
 }

@@ -145,7 +145,7 @@ fn write_auxiliary(
 
 /// Returns true if the picture holds radiance, which has to be converted for display.
 fn is_light(aov: &Aov) -> bool {
-    matches!(aov, Aov::Light(_) | Aov::Source { .. } | Aov::EverySource { .. })
+    matches!(aov, Aov::Light(_) | Aov::Source { .. } | Aov::EverySource { .. } | Aov::StandardError)
 }
 
 /// Returns the path of an auxiliary picture beside the main one, without characters that file systems

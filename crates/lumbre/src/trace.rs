@@ -12,7 +12,7 @@ use lumbre::bake::Progress;
 use lumbre::demo::has_light_to_bake;
 use lumbre::render::Display;
 use lumbre::trace::{
-    Continuation, Ended, Integrator, Metering, Picture, TraceError, TraceOptions, TraceReport, Tracer,
+    Aov, Continuation, Ended, Integrator, Metering, Picture, TraceError, TraceOptions, TraceReport, Tracer,
     draw_tree,
 };
 
@@ -141,6 +141,16 @@ fn meaningless(asked: &Trace) -> Vec<&'static str> {
             trees && asked.sample_by_noise,
             "--sample-by-noise is for --integrator path: --adaptive is what the ray tree has",
         ),
+        (
+            trees && asked.aov.contains(&Aov::StandardError),
+            "--aov standard-error is for --integrator path: the ray tree has no noise, and every pixel of that picture is infinite",
+        ),
+        (
+            asked.frame.every_shadow || asked.frame.rendering_path.is_some() || asked.frame.no_msaa,
+            "--every-shadow, --rendering-path and --no-msaa change nothing: every lamp casts its shadow, and there is one sample per pixel unless --samples asks for more",
+        ),
+        (!asked.frame.without.is_empty(), "--without is for frames: rays have every effect of the scene"),
+        (!trees && asked.frame.msaa, "--msaa is for the ray tree: paths take --samples"),
         (trees && asked.resume, "--resume is for --integrator path: ray trees begin anew"),
         (
             !trees && asked.frame.no_lightmaps,

@@ -95,7 +95,8 @@ fn auxiliary_pictures_are_layers_of_open_exr_and_files_beside_png() {
     let (folder, scene) = glass();
     let at = |name: &str| folder.path().join(name);
     for integrator in ["whitted", "path"] {
-        let (exr, asked) = (at("out.exr"), "albedo,normal,depth,rays,direct,bounced,light:*,light:lamp");
+        let (exr, asked) =
+            (at("out.exr"), "albedo,normal,depth,rays,standard-error,direct,bounced,light:*,light:lamp");
         let told = lumbre(&[
             "trace",
             text(&scene),
@@ -114,7 +115,7 @@ fn auxiliary_pictures_are_layers_of_open_exr_and_files_beside_png() {
         let found = channels(&exr);
         let light = found.keys().filter(|name| name.starts_with("light:") && name.ends_with(".R")).count();
         assert_eq!(light, if integrator == "whitted" { 3 } else { 2 }, "{:?}", found.keys());
-        let more = 3 * (1 + 2 + 2 + light) + 2;
+        let more = 3 * (1 + 2 + 1 + 2 + light) + 2;
         assert_eq!(found.len(), more, "{:?}", found.keys());
         for channel in ["R", "G", "B"] {
             let sum =
@@ -130,6 +131,9 @@ fn auxiliary_pictures_are_layers_of_open_exr_and_files_beside_png() {
         }
         assert!(found["depth.Z"].iter().any(|depth| depth.is_infinite()));
         assert!(found["rays.Y"].iter().all(|rays| *rays >= 8.0));
+        let known = found["standard-error.G"].iter().filter(|error| error.is_finite()).count();
+        assert_eq!(known, if integrator == "path" { 40 * 30 } else { 0 }, "only paths have noise");
+        assert!(integrator == "whitted" || found["standard-error.G"].iter().any(|error| *error > 0.0));
     }
     // A reader of three channels gets the picture.
     assert_eq!(image::open(at("out.exr")).unwrap().width(), 40);

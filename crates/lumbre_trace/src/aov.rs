@@ -20,6 +20,9 @@ pub enum Aov {
     Depth,
     /// Number of rays that the pixel took, shadow rays included.
     Rays,
+    /// Standard error of each pixel's radiance, linear RGB, estimated from the differences between the passes
+    /// of path tracing; infinite where a pixel has too few samples to state it, as those of ray trees have.
+    StandardError,
     /// Direct light, or all other light.
     Light(LightPart),
     /// The light of one source, or its direct or indirect part. A source is all lights and emissive objects
@@ -66,8 +69,8 @@ const EACH: &str = "*";
 
 impl Aov {
     /// Returns the picture with that name, or `None` if there is none: `albedo`, `normal`, `depth`, `rays`,
-    /// `direct`, `indirect` (or `bounced`), `light:NAME`, `direct:NAME`, `indirect:NAME`, where `*` as NAME
-    /// means every source.
+    /// `standard-error`, `direct`, `indirect` (or `bounced`), `light:NAME`, `direct:NAME`, `indirect:NAME`,
+    /// where `*` as NAME means every source.
     pub fn from_name(name: &str) -> Option<Self> {
         let (kind, source) = name.split_once(':').map_or((name, None), |(kind, source)| (kind, Some(source)));
         let part = match kind {
@@ -80,6 +83,7 @@ impl Aov {
             ("normal", _, None) => Some(Self::Normal),
             ("depth", _, None) => Some(Self::Depth),
             ("rays", _, None) => Some(Self::Rays),
+            ("standard-error", _, None) => Some(Self::StandardError),
             (_, Some(part), None) => Some(Self::Light(part)),
             (_, _, Some("")) => None,
             (_, Some(_), Some(source)) | ("light", None, Some(source)) => Some(match source {
@@ -104,6 +108,7 @@ impl fmt::Display for Aov {
             Self::Normal => f.write_str("normal"),
             Self::Depth => f.write_str("depth"),
             Self::Rays => f.write_str("rays"),
+            Self::StandardError => f.write_str("standard-error"),
             Self::Light(part) => f.write_str(part.name()),
             Self::Source { name, part } => write!(f, "{}:{name}", kind(part)),
             Self::EverySource { part } => write!(f, "{}:{EACH}", kind(part)),
@@ -137,9 +142,17 @@ mod tests {
 
     #[test]
     fn names_are_read_as_they_are_written() {
-        for name in
-            ["albedo", "normal", "depth", "rays", "direct", "indirect", "light:lamp: left", "direct:*"]
-        {
+        for name in [
+            "albedo",
+            "normal",
+            "depth",
+            "rays",
+            "standard-error",
+            "direct",
+            "indirect",
+            "light:lamp: left",
+            "direct:*",
+        ] {
             let aov = Aov::from_name(name);
             assert_eq!(aov.map(|aov| aov.to_string()).as_deref(), Some(name));
         }

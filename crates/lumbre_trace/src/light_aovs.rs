@@ -51,7 +51,7 @@ impl LightAovs {
                         found.take(own, *part, Some(sources_of(&named, name)));
                     }
                 }
-                Aov::Albedo | Aov::Normal | Aov::Depth | Aov::Rays => {}
+                Aov::Albedo | Aov::Normal | Aov::Depth | Aov::Rays | Aov::StandardError => {}
             }
         }
         Ok(found)

@@ -145,6 +145,11 @@ impl Tracer {
                 (Aov::Rays, _) => {
                     AovValues::Numbers(film.pixels.iter().map(|pixel| f64::from(pixel.rays)).collect())
                 }
+                (Aov::StandardError, _) => {
+                    let unknown = DVec3::INFINITY;
+                    let errors = film.pixels.iter().map(|pixel| pixel.standard_error().unwrap_or(unknown));
+                    AovValues::Colors(errors.collect())
+                }
                 _ => continue,
             };
             pictures.push(AovPicture { aov: aov.clone(), values });
