@@ -233,7 +233,20 @@ fn the_tree_of_a_pixel_names_what_it_meets() {
     );
     let json: serde_json::Value = serde_json::from_str(&tree("json")).unwrap();
     assert_eq!(json["branches"].as_array().unwrap().len(), 2);
-    assert!(tree("dot").starts_with("digraph") && tree("svg").starts_with("<svg"));
+    // A graph names every branch as the text does: its medium, its weight and the terms of its sum.
+    let (graph, drawing) = (tree("dot"), tree("svg"));
+    assert!(graph.starts_with("digraph") && drawing.starts_with("<svg") && drawing.ends_with("</svg>\n"));
+    for line in words.lines().map(str::trim).filter(|line| line.starts_with('+') || line.contains("S = ")) {
+        assert!(graph.contains(line), "{line} in {graph}");
+    }
+    for part in words.split(", ").filter(|part| part.starts_with("counts ")) {
+        assert!(graph.contains(part.lines().next().unwrap_or_default()), "{part} in {graph}");
+    }
+    let points = words.matches(" m through ").count();
+    assert!(points > 1 && graph.matches(" m through ").count() == points, "{graph}");
+    // Every point is drawn in both views, with the name of its object.
+    assert_eq!(drawing.matches("<circle").count(), 2 * points, "{drawing}");
+    assert_eq!(drawing.matches("<text").count(), 2 * points + 2, "{drawing}");
 }
 
 #[test]

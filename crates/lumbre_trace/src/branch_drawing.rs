@@ -1,5 +1,5 @@
 //! Output of a recorded ray tree: as indented text, as JSON, as a Graphviz graph, and as an SVG drawing of
-//! the rays from above and from the side. The tree itself is in `branch`.
+//! the rays, with the names of what they meet, from above and from the side. The tree itself is in `branch`.
 
 use std::fmt::Write;
 
@@ -97,42 +97,49 @@ fn text(out: &mut String, branch: &Branch, depth: usize) -> std::fmt::Result {
         point.medium,
         point.index
     )?;
-    if point.transmittance != DVec3::ONE {
-        writeln!(out, "{indent}  left by the way: {}", color(point.transmittance))?;
-    }
-    if let Some(light) = &branch.light {
-        for (name, value) in [
-            ("emission", light.emission),
-            ("ambient", light.ambient),
-            ("lightmap", light.baked),
-            ("diffuse", light.diffuse),
-            ("specular", light.specular),
-            ("transmitted highlight", light.transmitted),
-        ] {
-            if value != DVec3::ZERO {
-                writeln!(out, "{indent}  + {name} {}", color(value))?;
-            }
-        }
-        for lamp in &light.lights {
-            writeln!(
-                out,
-                "{indent}    {}: S = {}, diffuse {}, specular {}{}",
-                lamp.light,
-                color(lamp.visibility),
-                color(lamp.diffuse),
-                color(lamp.specular),
-                if lamp.transmitted == DVec3::ZERO {
-                    String::new()
-                } else {
-                    format!(", transmitted {}", color(lamp.transmitted))
-                }
-            )?;
-        }
+    for term in terms(branch) {
+        writeln!(out, "{indent}  {term}")?;
     }
     for next in &branch.branches {
         text(out, next, depth + 1)?;
     }
     writeln!(out, "{indent}  = {}", color(branch.radiance))
+}
+
+/// Returns what the light at a branch's point is made up of, a line for each term and each lamp; the lines of
+/// lamps are indented.
+fn terms(branch: &Branch) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(point) = branch.point.as_ref().filter(|point| point.transmittance != DVec3::ONE) {
+        lines.push(format!("left by the way: {}", color(point.transmittance)));
+    }
+    let Some(light) = &branch.light else { return lines };
+    for (name, value) in [
+        ("emission", light.emission),
+        ("ambient", light.ambient),
+        ("lightmap", light.baked),
+        ("diffuse", light.diffuse),
+        ("specular", light.specular),
+        ("transmitted highlight", light.transmitted),
+    ] {
+        if value != DVec3::ZERO {
+            lines.push(format!("+ {name} {}", color(value)));
+        }
+    }
+    for lamp in &light.lights {
+        let transmitted = match lamp.transmitted {
+            DVec3::ZERO => String::new(),
+            passing => format!(", transmitted {}", color(passing)),
+        };
+        lines.push(format!(
+            "  {}: S = {}, diffuse {}, specular {}{transmitted}",
+            lamp.light,
+            color(lamp.visibility),
+            color(lamp.diffuse),
+            color(lamp.specular)
+        ));
+    }
+    lines
 }
 
 fn dot(out: &mut String, tree: &Branch) -> std::fmt::Result {
@@ -149,12 +156,26 @@ fn dot_branch(out: &mut String, branch: &Branch, parent: &str, count: &mut usize
         (_, true) => "cut off".to_owned(),
         (None, false) => format!("background\\n{}", color(branch.radiance)),
         (Some(point), false) => {
-            format!("{}\\n{}\\nI = {}", escaped(&point.object), place(point.position), color(branch.radiance))
+            let side = if point.front { "front" } else { "back" };
+            let mut lines = vec![
+                format!("{} ({side})", point.object),
+                place(point.position),
+                format!("{:.4} m through {} (index {:.3})", point.distance, point.medium, point.index),
+            ];
+            lines.extend(terms(branch));
+            lines.push(format!("I = {}", color(branch.radiance)));
+            // The sequence \l ends a line that is aligned to the left.
+            lines.iter().map(|line| escaped(line) + "\\l").collect()
         }
     };
     writeln!(out, "  {own} [label=\"{label}\"];")?;
+    let kind = branch.kind.name();
+    let weights = match branch.kind {
+        Kind::Camera => kind.to_owned(),
+        _ => format!("{kind}\\ntimes {}\\ncounts {}", color(branch.factor), color(branch.weight)),
+    };
     let style = if branch.cut { ", style=dashed" } else { "" };
-    writeln!(out, "  {parent} -> {own} [label=\"{} {}\"{style}];", branch.kind.name(), color(branch.factor))?;
+    writeln!(out, "  {parent} -> {own} [label=\"{weights}\"{style}];")?;
     for next in &branch.branches {
         dot_branch(out, next, &own, count)?;
     }
@@ -163,6 +184,10 @@ fn dot_branch(out: &mut String, branch: &Branch, parent: &str, count: &mut usize
 
 fn escaped(name: &str) -> String {
     name.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', " ")
+}
+
+fn escaped_markup(name: &str) -> String {
+    name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Width and height of a view in pixels.
@@ -232,8 +257,15 @@ fn svg_branch(
         "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{stroke}\" stroke-width=\"{width:.2}\"{dashes}/>",
         from.x, from.y, to.x, to.y
     )?;
-    if branch.point.is_some() {
+    if let Some(point) = &branch.point {
+        let name = escaped_markup(&point.object);
         writeln!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.5\" fill=\"{stroke}\"/>", to.x, to.y)?;
+        writeln!(
+            out,
+            "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{stroke}\">{name}</text>",
+            to.x + 5.0,
+            to.y - 4.0
+        )?;
     }
     branch.branches.iter().try_for_each(|next| svg_branch(out, next, open, project))
 }
