@@ -168,9 +168,12 @@ pub struct Plot {
     pub up: Quantity,
     /// The series to be drawn; all of them if empty.
     pub series: Vec<String>,
+    /// If given, only the points that vary the parameter with this name are drawn.
+    #[serde(default)]
+    pub varied: Option<String>,
     /// Whether the points of a series are joined by a line, ordered by the horizontal quantity.
     pub joined: bool,
-    /// Whether the points that no other point beats in both quantities are marked.
+    /// Whether the points that no other point with the same reference beats in both quantities are marked.
     pub front: bool,
     /// Whether a line marks where both quantities are equal.
     pub equal: bool,
