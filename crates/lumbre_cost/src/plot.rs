@@ -210,7 +210,9 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<V
                 (_, Quantity::Milliseconds) => [(at.0, time.lower), (at.0, time.upper)],
                 _ => continue,
             };
-            chart.draw_series(LineSeries::new(ends.map(onto), style.stroke_width(1))).map_err(told)?;
+            let ends = ends.map(onto);
+            lines.push(ends.to_vec());
+            chart.draw_series(LineSeries::new(ends, style.stroke_width(1))).map_err(told)?;
         }
     }
     let area = chart.plotting_area();

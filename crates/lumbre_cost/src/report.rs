@@ -29,7 +29,7 @@ pub struct Machine {
     pub system: String,
     /// The GPU or software rasterizer, with its driver.
     pub adapter: String,
-    /// Version of Lumbre, and whether it was built with optimizations.
+    /// Version of Lumbre, whether it was built with optimizations, and a hash of the program's file.
     pub version: String,
 }
 
@@ -74,7 +74,7 @@ pub struct Study {
     /// state it.
     #[serde(default)]
     pub method: u32,
-    /// Version of the program that measured it.
+    /// Version and build of the program that measured it.
     #[serde(default)]
     pub version: String,
 }

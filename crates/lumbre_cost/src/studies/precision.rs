@@ -27,8 +27,8 @@ const CASES: [(&str, Sheet); 9] = [
     ("lamp at 2 cm", Sheet { height: 0.02, ..Sheet::PLAIN }),
     ("lamp a million times as bright", Sheet { brightness: 1e6, ..Sheet::PLAIN }),
     (
-        "edge of a spotlight",
-        Sheet { cone: Some(SpotCone::Smooth { inner: 0.4, outer: 0.401 }), ..Sheet::PLAIN },
+        "narrow spotlight",
+        Sheet { height: 8.0, cone: Some(SpotCone::Smooth { inner: 0.0, outer: 0.1 }), ..Sheet::PLAIN },
     ),
     ("light at 0.1°", Sheet { grazing: Some(0.001_745_329), ..Sheet::PLAIN }),
     ("10000 km away", Sheet { far: 1e7, ..Sheet::PLAIN }),
