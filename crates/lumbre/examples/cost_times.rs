@@ -1,8 +1,8 @@
 //! Whether the times of a report are those that `lumbre render --timings` states: runs the command of every frame of a report that `lumbre cost` has made in several processes, and prints both. Compared are
-//! lower quartiles, of the processes the least: on a software rasterizer a whole process may be slow, because of how the operating system spreads the threads of a frame over the cores, and none is fast by chance.
+//! lower quartiles, the least of all processes and of all reports (of the same scenes and settings), if there are several: on a software rasterizer a whole process may be slow, because of how the operating system spreads the threads of a frame over the cores, and none is fast by chance.
 //! Exit status 1 if they are off by more than a tenth in the median.
 //!
-//! `cargo run --release -p lumbre --example cost_times -- REPORT [STUDY…]`, with the program built beside it (`cargo build --release`).
+//! `cargo run --release -p lumbre --example cost_times -- REPORT… [STUDY…]`, with the program built beside it (`cargo build --release`).
 
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context, bail};
-use lumbre::cost::{Spread, command_words, read_report};
+use lumbre::cost::{CostReport, Point, Spread, command_words, read_report};
 
 /// By how much the two may differ in the median, as a share.
 const APART: f64 = 0.1;
@@ -22,11 +22,17 @@ const PROCESSES: usize = 3;
 const FRAMES: usize = 40;
 
 fn main() -> anyhow::Result<ExitCode> {
-    let mut arguments = std::env::args().skip(1);
-    let folder = PathBuf::from(arguments.next().context("name the folder of a report")?);
-    let studies: Vec<String> = arguments.collect();
+    let named: Vec<String> = std::env::args().skip(1).collect();
+    let (folders, studies): (Vec<String>, Vec<String>) =
+        named.into_iter().partition(|name| Path::new(name).is_dir());
+    let folder = PathBuf::from(folders.first().context("name the folder of a report")?);
     let program = program()?;
     let report = read_report(&folder)?;
+    let others: Vec<CostReport> =
+        folders[1..].iter().map(|other| read_report(Path::new(other))).collect::<Result<_, _>>()?;
+    if others.iter().any(|other| other.settings != report.settings) {
+        bail!("the reports have different settings");
+    }
     println!("{}; {}", report.machine.adapter, report.machine.version);
     let mut frames = Vec::new();
     for study in report.studies.iter().filter(|study| studies.is_empty() || studies.contains(&study.name)) {
@@ -43,7 +49,13 @@ fn main() -> anyhow::Result<ExitCode> {
                 && commands.iter().all(draws)
             {
                 let name = format!("{} | {}, {}", study.name, point.series, point.label);
-                frames.push((name, with_more_frames(timed), reported, Vec::new()));
+                let same = others.iter().filter_map(|other| {
+                    let points = &other.study(&study.name)?.points;
+                    let is_same = |found: &&Point| found.series == point.series && found.label == point.label;
+                    Some(points.iter().find(is_same)?.milliseconds?.lower)
+                });
+                let least = same.fold(reported.lower, f64::min);
+                frames.push((name, with_more_frames(timed), (reported, least), Vec::new()));
             }
         }
     }
@@ -56,9 +68,9 @@ fn main() -> anyhow::Result<ExitCode> {
         "| study | point | report, ms | --timings, ms, in {PROCESSES} processes | ratio |\n|---|---|---|---|---|"
     );
     let mut ratios = Vec::new();
-    for (name, _, reported, stated) in &frames {
+    for (name, _, (reported, of_reports), stated) in &frames {
         let least = stated.iter().map(|one: &Spread| one.lower).fold(f64::INFINITY, f64::min);
-        let ratio = reported.lower / least;
+        let ratio = of_reports / least;
         let all: Vec<String> = stated
             .iter()
             .map(|one| format!("{:.2} ({:.2} to {:.2})", one.median, one.lower, one.upper))
