@@ -73,9 +73,6 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
     let display = asked.frame.display.unwrap_or(if floats { Display::Linear } else { Display::Srgb });
     let aspect = f64::from(width) / f64::from(height);
     let mut options = frame_options(&mut loaded.world, &asked.frame, display, aspect, &asked.input)?;
-    if asked.timings.is_some() {
-        options.measure = Measure::TimeAndInvocations;
-    }
     let gpu = Gpu::headless()?;
     let photometric = loaded.report.photometric_lights > 0 && !loaded.report.states_exposure;
     options.exposure =
@@ -84,7 +81,14 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
     let format = if floats { OffscreenFormat::LinearFloat } else { OffscreenFormat::Rgba8 };
     let target = Offscreen::new(&gpu, width, height, format)?;
     let (mut frames, mut census) = (Vec::new(), None);
-    for _ in 0..asked.frames {
+    for number in 0..asked.frames {
+        // Counting invocations takes time. The first frame is not like the others anyway, since pipelines are
+        // made in it.
+        options.measure = match number {
+            _ if asked.timings.is_none() => Measure::Nothing,
+            0 => Measure::TimeAndInvocations,
+            _ => Measure::Time,
+        };
         let start = Instant::now();
         let report = renderer
             .render(&mut loaded.world, &target.target(), &options)
@@ -94,6 +98,11 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
         let accounting = renderer.accounting().filter(|_| asked.timings.is_some()).cloned();
         frames.push(frame_times(wall_ms, report.statistics, measured, accounting));
         census = Some(Census::clone(&report.census));
+    }
+    if let [counted, others @ ..] = &mut frames[..]
+        && let Some(counted) = &counted.accounting
+    {
+        others.iter_mut().for_each(|frame| frame.take_invocations_of(counted));
     }
     let shows_something = write_frame(&asked.output, &gpu, &target, floats)?;
     if !shows_something && loaded.report.triangles > 0 {
@@ -130,6 +139,19 @@ impl Timings {
 }
 
 impl FrameTimes {
+    /// Takes over the shader invocations of another frame of the same scene.
+    fn take_invocations_of(&mut self, counted: &Accounting) {
+        for pass in &mut self.passes {
+            let same = counted.passes.iter().find(|other| other.pass == pass.name);
+            let invocations = same.and_then(|same| same.invocations);
+            pass.vertex_invocations = invocations.map(|counts| counts.vertex);
+            pass.fragment_invocations = invocations.map(|counts| counts.fragment);
+        }
+        if let Some(accounting) = &mut self.accounting {
+            accounting.take_invocations_of(counted);
+        }
+    }
+
     /// Takes over the light counts of another frame of the same scene.
     fn take_lights_of(&mut self, counted: &Accounting) {
         for pass in &mut self.passes {

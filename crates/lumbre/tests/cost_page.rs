@@ -1,4 +1,4 @@
-//! The page of a report in a browser: `scripts/cost_page`, where Chromium and what drives it are there. Elsewhere it is skipped, and says so.
+//! The page of a report with all studies in a browser: `scripts/cost_page`, where Chromium and what drives it are there. Elsewhere it is skipped, and says so.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -35,9 +35,8 @@ fn a_browser_clicks_through_the_page() {
     }
     let folder = tempfile::tempdir().unwrap();
     let report = folder.path().join("report");
-    let studies = ["--study", "shading", "--study", "reflection", "--study", "precision", "--study", "tour"];
     let asked = ["cost", "-o", report.to_str().unwrap(), "--quick", "--size", "64x40"];
-    let lumbre = Command::new(env!("CARGO_BIN_EXE_lumbre")).args(asked).args(studies).output().unwrap();
+    let lumbre = Command::new(env!("CARGO_BIN_EXE_lumbre")).args(asked).output().unwrap();
     assert!(lumbre.status.success(), "{}", String::from_utf8_lossy(&lumbre.stderr));
     let checked = Command::new(root.join("scripts/cost_page")).arg(&report).output().unwrap();
     let said =

@@ -1,10 +1,12 @@
-//! Compares two reports. Counts and errors differ if they differ by more than a factor; times, only if their
-//! quartiles do not overlap either.
+//! Compares two reports. Counts and errors differ if they differ by more than a factor. Times are judged
+//! relative to the drift that all times of their study have in common, because a machine is not equally fast
+//! at every hour: they differ if their quartiles do not overlap then, and if the difference is larger than
+//! what two runs of one program differ by.
 
 use std::fmt;
 
 use crate::findings::{milliseconds, percent, rounded};
-use crate::{CostReport, Point, Spread};
+use crate::{CostReport, Point, Spread, Study};
 
 /// A difference between two reports.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,12 +63,21 @@ pub enum What {
         /// Its value in the second report, as a fraction.
         after: f64,
     },
-    /// The time differs, and the quartiles do not overlap.
+    /// The time differs by more than the study as a whole, and the quartiles do not overlap.
     Time {
         /// Its value in the first report.
         before: Spread,
         /// Its value in the second report.
         after: Spread,
+        /// The factor by which the times of the study differ as a whole.
+        drift: f64,
+    },
+    /// The times of the whole study differ by a factor: the median of its points' ratios.
+    Drift {
+        /// The median ratio of a time to that of the first report.
+        factor: f64,
+        /// The number of points that have both times.
+        points: usize,
     },
 }
 
@@ -91,21 +102,78 @@ impl Figure {
 /// Errors below this are rounding errors, whose ratio means nothing.
 const NEGLIGIBLE_ERROR: f64 = 1e-5;
 
+/// The factor by which a time may differ between two runs of one program, beyond the drift of its study. On a
+/// processor that draws, the scheduler of the operating system decides how the threads of a frame share its
+/// cores, and a whole run may keep to one way: of 152 times of two quick reports, all were within 1.6.
+pub const NOISE_OF_RUNS: f64 = 1.8;
+/// The factor by which the times of a study as a whole may grow before the program is to blame rather than the
+/// machine: a frame of two threads takes twice as long while something else keeps one of two cores busy.
+pub const DRIFT_OF_MACHINES: f64 = 2.5;
+/// Smallest number of points whose median ratio is taken for a drift. With fewer, one slower point would
+/// be taken for a slower machine.
+const MIN_POINTS_OF_DRIFT: usize = 5;
+/// How many times the scatter of a study's ratios a ratio may lie beyond their median.
+const SCATTERS: f64 = 3.0;
+/// Ratio of the standard deviation of a normal distribution to its median absolute deviation.
+const DEVIATION: f64 = 1.4826;
+
+/// How the times of a study differ as a whole.
+#[derive(Clone, Copy, Debug)]
+struct Drift {
+    /// The median ratio.
+    factor: f64,
+    /// The factor by which ratios scatter about it.
+    scatter: f64,
+    /// The number of ratios.
+    points: usize,
+}
+
+impl Drift {
+    /// A drift of nothing.
+    const NONE: Self = Self { factor: 1.0, scatter: 1.0, points: 0 };
+
+    /// Returns the drift of these ratios; `None` if there are too few of them.
+    fn of(ratios: &[f64]) -> Option<Self> {
+        if ratios.len() < MIN_POINTS_OF_DRIFT {
+            return None;
+        }
+        let factor = Spread::of(ratios)?.median;
+        let apart: Vec<f64> = ratios.iter().map(|ratio| (ratio / factor).ln().abs()).collect();
+        let scatter = (DEVIATION * Spread::of(&apart)?.median).exp();
+        Some(Self { factor, scatter, points: ratios.len() })
+    }
+}
+
+/// Returns the ratios of the times of a study's points to those in another report.
+fn ratios_of_times(before: &Study, after: &Study) -> Vec<f64> {
+    let ratio = |point: &Point| {
+        let other = after.points.iter().find(|found| is_same(point, found))?;
+        let (was, is) = (point.milliseconds?.median, other.milliseconds?.median);
+        (was > 0.0 && is > 0.0).then_some(is / was)
+    };
+    before.points.iter().filter_map(ratio).collect()
+}
+
 impl Change {
     /// Returns true if the second report is worse by this change: a point, a count or an error is missing, or
     /// a count or an error is larger. Times alone do not make a report worse.
     pub fn is_worse(&self) -> bool {
         match &self.what {
             What::Gone | What::Uncounted { .. } | What::Lost(Figure::Error) => true,
-            What::New | What::Counted { .. } | What::Time { .. } | What::Lost(Figure::Time) => false,
-            What::Gained(_) | What::Method { .. } => false,
+            What::New | What::Counted { .. } | What::Time { .. } | What::Drift { .. } => false,
+            What::Lost(Figure::Time) | What::Gained(_) | What::Method { .. } => false,
             What::Count { before, after, .. } | What::Error { before, after } => after > before,
         }
     }
 
-    /// Returns true if it is a time that is longer in the second report.
+    /// Returns true if a time is longer in the second report, relative to its study, or if the whole study
+    /// takes longer than a machine's drift explains.
     pub fn is_slower(&self) -> bool {
-        matches!(&self.what, What::Time { before, after } if after.median > before.median)
+        match &self.what {
+            What::Time { before, after, drift } => after.median > before.median * drift,
+            What::Drift { factor, .. } => *factor > DRIFT_OF_MACHINES,
+            _ => false,
+        }
     }
 }
 
@@ -137,18 +205,36 @@ impl fmt::Display for Change {
                 let factor = times(*before, *after);
                 write!(f, ": error {} instead of {}{factor}", percent(*after), percent(*before))
             }
-            What::Time { before, after } => {
+            What::Time { before, after, drift } => {
                 let factor = times(before.median, after.median);
-                write!(f, ": {} instead of {}{factor}", milliseconds(after), milliseconds(before))
+                write!(f, ": {} instead of {}{factor}", milliseconds(after), milliseconds(before))?;
+                match *drift == 1.0 {
+                    true => Ok(()),
+                    false => write!(
+                        f,
+                        ", {} times relative to its study",
+                        rounded(after.median / before.median / drift)
+                    ),
+                }
+            }
+            What::Drift { factor, points } => {
+                write!(f, ": its {points} times are {} times as long in the median", rounded(*factor))
             }
         }
     }
 }
 
-/// Returns the differences between two reports that exceed a factor (above 1) in either direction.
+/// Returns the differences between two reports that exceed a factor (above 1) in either direction. Times of
+/// points must exceed [`NOISE_OF_RUNS`] too.
 pub fn compare_reports(before: &CostReport, after: &CostReport, factor: f64) -> Vec<Change> {
     let mut changes = Vec::new();
     let whole = |study: &str, what| Change { study: study.to_owned(), point: String::new(), what };
+    let pairs = before.studies.iter().filter_map(|study| {
+        after.study(&study.name).filter(|other| other.method == study.method).map(|other| (study, other))
+    });
+    let all: Vec<f64> = pairs.flat_map(|(study, other)| ratios_of_times(study, other)).collect();
+    // Studies of few points share the drift of all others.
+    let drift_of_all = Drift::of(&all).unwrap_or(Drift::NONE);
     for study in &before.studies {
         let Some(other) = after.study(&study.name) else {
             changes.push(whole(&study.name, What::Gone));
@@ -158,6 +244,13 @@ pub fn compare_reports(before: &CostReport, after: &CostReport, factor: f64) -> 
             changes.push(whole(&study.name, What::Method { before: study.method, after: other.method }));
             continue;
         }
+        let own = Drift::of(&ratios_of_times(study, other));
+        if let Some(Drift { factor: drift, points, .. }) = own
+            && is_beyond(1.0, drift, factor)
+        {
+            changes.push(whole(&study.name, What::Drift { factor: drift, points }));
+        }
+        let drift = own.unwrap_or(drift_of_all);
         let mut note = |point: &Point, what| {
             let point = format!("{}, {}", point.series, point.label);
             changes.push(Change { study: study.name.clone(), point, what });
@@ -165,7 +258,7 @@ pub fn compare_reports(before: &CostReport, after: &CostReport, factor: f64) -> 
         for point in &study.points {
             match other.points.iter().find(|found| is_same(point, found)) {
                 Some(found) => {
-                    differences(point, found, factor).into_iter().for_each(|what| note(point, what))
+                    differences(point, found, factor, drift).into_iter().for_each(|what| note(point, what))
                 }
                 None => note(point, What::Gone),
             }
@@ -186,8 +279,13 @@ fn is_same(a: &Point, b: &Point) -> bool {
     a.series == b.series && a.label == b.label
 }
 
-fn differences(before: &Point, after: &Point, factor: f64) -> Vec<What> {
-    let beyond = |a: f64, b: f64| a != b && !(b <= a * factor && a <= b * factor);
+/// Returns true if two numbers differ by more than a factor.
+fn is_beyond(a: f64, b: f64, factor: f64) -> bool {
+    a != b && !(b <= a * factor && a <= b * factor)
+}
+
+fn differences(before: &Point, after: &Point, factor: f64, drift: Drift) -> Vec<What> {
+    let beyond = |a: f64, b: f64| is_beyond(a, b, factor);
     let mut found = Vec::new();
     for (name, &count) in &before.counts {
         match after.counts.get(name) {
@@ -219,9 +317,11 @@ fn differences(before: &Point, after: &Point, factor: f64) -> Vec<What> {
         }
     }
     if let (Some(was), Some(is)) = (before.milliseconds, after.milliseconds) {
-        let apart = was.is_below(&is) || is.is_below(&was);
-        if apart && beyond(was.median, is.median) {
-            found.push(What::Time { before: was, after: is });
+        let expected = was.times(drift.factor);
+        let apart = expected.is_below(&is) || is.is_below(&expected);
+        let noise = factor.max(NOISE_OF_RUNS).max(drift.scatter.powf(SCATTERS));
+        if apart && is_beyond(expected.median, is.median, noise) {
+            found.push(What::Time { before: was, after: is, drift: drift.factor });
         }
     }
     found

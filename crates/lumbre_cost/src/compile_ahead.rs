@@ -9,18 +9,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use lumbre_render::{Gpu, Offscreen, OffscreenFormat, RenderError, Renderer};
 
-use crate::frame::{Frame, picture_options};
+use crate::frame::{Frame, counting_options, picture_options};
 
-/// The drawings of a frame: its picture in full precision, and the frame as it is timed.
+/// The drawings of a frame: its picture in full precision, the same with its light evaluations counted, and
+/// the frame as it is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drawing {
     Picture,
+    Counted,
     Timed,
 }
 
 /// Which drawings of each frame have been started, by either thread.
 #[derive(Debug)]
-pub struct Begun(Vec<[AtomicBool; 2]>);
+pub struct Begun(Vec<[AtomicBool; 3]>);
 
 impl Begun {
     /// Returns the state for this many frames, with nothing started.
@@ -81,6 +83,7 @@ fn draw(
             }
             let (target, options) = match drawing {
                 Drawing::Picture => (&picture, picture_options(&frame.options)),
+                Drawing::Counted => (&picture, counting_options(&frame.options)),
                 Drawing::Timed => (&timed, frame.options.clone()),
             };
             renderer.render(&mut frame.world(), &target.target(), &options)?;

@@ -37,6 +37,8 @@ pub struct Conditions<'a> {
     /// Whether only counts are wanted: nothing is timed or compared, and whatever serves only that is done
     /// once, or cut short.
     pub counts_only: bool,
+    /// Whether the light evaluations of frames are counted, which needs shader variants of its own.
+    pub counts_lights: bool,
     /// Width and height of the study's pictures in pixels.
     pub size: (u32, u32),
     /// Requested width and height. A study may draw smaller pictures.

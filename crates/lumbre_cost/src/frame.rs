@@ -19,8 +19,6 @@ pub struct Frame {
     /// Whether every lamp that casts shadows moves slightly, alternately to and fro, before each timed frame,
     /// so that no shadow map can be reused.
     pub moving_lamps: bool,
-    /// Whether light evaluations are counted, which needs shader variants of its own.
-    pub counts_lights: bool,
 }
 
 impl Frame {
@@ -31,7 +29,7 @@ impl Frame {
 
     /// Creates a frame of a scene that other frames show too.
     pub fn of(world: &Arc<Mutex<World>>, options: FrameOptions) -> Self {
-        Self { world: Arc::clone(world), options, renderer: None, moving_lamps: false, counts_lights: false }
+        Self { world: Arc::clone(world), options, renderer: None, moving_lamps: false }
     }
 
     /// Locks the scene.
@@ -43,11 +41,6 @@ impl Frame {
     /// Returns the frame with a renderer shared by all frames with this name.
     pub fn sharing(self, renderer: &'static str) -> Self {
         Self { renderer: Some(renderer), ..self }
-    }
-
-    /// Returns the frame with its light evaluations counted or not.
-    pub fn counting_lights(self, counts_lights: bool) -> Self {
-        Self { counts_lights, ..self }
     }
 
     /// Returns the frame with moving lamps.
@@ -65,4 +58,10 @@ pub fn picture_options(options: &FrameOptions) -> FrameOptions {
         measure: Measure::Nothing,
         ..options.clone()
     }
+}
+
+/// Returns the options with which the light evaluations of a frame are counted, by shader variants that draw
+/// its picture.
+pub fn counting_options(options: &FrameOptions) -> FrameOptions {
+    FrameOptions { measure: Measure::Lights, ..picture_options(options) }
 }

@@ -14,7 +14,7 @@ use lumbre_render::{FrameOptions, FrameTarget, Measure, Offscreen, OffscreenForm
 use lumbre_scene::Transform;
 
 use crate::compile_ahead::{Begun, Drawing, compile_ahead};
-use crate::frame::{Frame, picture_options};
+use crate::frame::{Frame, counting_options, picture_options};
 use crate::picture::Picture;
 use crate::rounds::{Work, in_rounds, milliseconds_since, warm_up};
 use crate::{Conditions, CostError, Spread};
@@ -98,8 +98,9 @@ pub fn draw_frames(
                     picture_of(conditions, &mut renderers[number].borrow_mut(), &mut world, &frame.options)?
                 }
             };
-            if frame.counts_lights && !conditions.counts_only {
+            if conditions.counts_lights {
                 // The counting shader variants are not used for anything else.
+                begun.begin(number, Drawing::Counted);
                 let mut counting = conditions.pictures.borrow_mut();
                 found.light_evaluations = lights_of(conditions, &mut counting, &mut world, &frame.options)?;
             }
@@ -143,12 +144,15 @@ fn while_compiling_ahead<T>(
     std::thread::scope(|scope| {
         let ahead = conditions.ahead.filter(|_| frames.len() > 1).map(|gpu| {
             let (begun, end) = (&begun, &end);
-            let drawings: &[Drawing] = match conditions.as_shown {
-                true => &[Drawing::Picture, Drawing::Timed],
-                // Timed frames use the same pipelines.
-                false => &[Drawing::Picture],
-            };
-            scope.spawn(move || compile_ahead(gpu, size, frames, drawings, begun, end))
+            // Frames that are timed as their pictures are drawn use the same pipelines.
+            let drawings = [
+                (Drawing::Picture, true),
+                (Drawing::Counted, conditions.counts_lights),
+                (Drawing::Timed, conditions.as_shown),
+            ];
+            let drawings: Vec<Drawing> =
+                drawings.into_iter().filter(|(_, is_made)| *is_made).map(|(drawing, _)| drawing).collect();
+            scope.spawn(move || compile_ahead(gpu, size, frames, &drawings, begun, end))
         });
         let ending = EndsWhenDropped(&end);
         let drawn = draw(&begun);
@@ -262,8 +266,7 @@ fn lights_of(
 ) -> Result<Option<[u64; 2]>, CostError> {
     let (width, height) = conditions.size;
     let target = Offscreen::new(conditions.gpu, width, height, OffscreenFormat::LinearFloat)?;
-    let options = FrameOptions { measure: Measure::Lights, ..picture_options(options) };
-    renderer.render(world, &target.target(), &options)?;
+    renderer.render(world, &target.target(), &counting_options(options))?;
     renderer.wait()?;
     let counts =
         renderer.accounting().into_iter().flat_map(|account| &account.passes).filter_map(|pass| pass.lights);
@@ -310,6 +313,7 @@ mod tests {
                 converged: &converged,
                 quick: true,
                 counts_only: false,
+                counts_lights: true,
                 size: (64, 36),
                 size_of_report: (64, 36),
                 as_shown,

@@ -31,6 +31,23 @@ pub fn front_of<'a>(
     known.into_iter().map(|(point, ..)| point).collect()
 }
 
+/// Returns the fronts of all points that can be compared with each other, which are those whose errors have
+/// the same reference.
+pub fn fronts_by_reference<'a>(
+    points: impl IntoIterator<Item = &'a Point>,
+    numbers: impl Fn(&Point) -> Option<(f64, f64)>,
+) -> Vec<Vec<&'a Point>> {
+    let mut groups: Vec<(Option<&str>, Vec<&Point>)> = Vec::new();
+    for point in points {
+        let reference = point.picture.as_ref().map(|files| files.reference.as_str());
+        match groups.iter_mut().find(|(known, _)| *known == reference) {
+            Some((_, group)) => group.push(point),
+            None => groups.push((reference, vec![point])),
+        }
+    }
+    groups.into_iter().map(|(_, group)| front_of(group, &numbers)).collect()
+}
+
 /// The cheapest choices within a range of errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch<'a> {
@@ -99,4 +116,34 @@ pub fn stretches<'a>(points: &[&'a Point]) -> Vec<Stretch<'a>> {
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PointPicture;
+
+    #[test]
+    fn points_with_different_references_do_not_beat_each_other() {
+        let point = |label: &str, ms: f64, error: f64, reference: &str| Point {
+            label: label.into(),
+            milliseconds: Spread::of(&[ms]),
+            error: Some(ErrorOf { relative_rmse: error, ..ErrorOf::default() }),
+            picture: Some(PointPicture { reference: reference.into(), ..PointPicture::default() }),
+            ..Point::default()
+        };
+        let points = [
+            point("quick", 1.0, 0.1, "near"),
+            point("worse in both", 5.0, 0.3, "far"),
+            point("beaten by its own", 2.0, 0.2, "near"),
+            point("worse and alone", 9.0, 0.2, "far"),
+        ];
+        let fronts = fronts_by_reference(&points, |point| {
+            Some((point.milliseconds?.median, point.error?.relative_rmse))
+        });
+        let labels: Vec<Vec<&str>> =
+            fronts.iter().map(|front| front.iter().map(|point| point.label.as_str()).collect()).collect();
+        assert_eq!(labels, [vec!["quick"], vec!["worse in both", "worse and alone"]]);
+        assert_eq!(pareto_front(&points).len(), 1);
+    }
 }

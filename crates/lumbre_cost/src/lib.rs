@@ -61,7 +61,7 @@ mod traced;
 mod tune;
 
 pub use command_line::command_words;
-pub use comparison::{Change, Figure, What, compare_reports};
+pub use comparison::{Change, DRIFT_OF_MACHINES, Figure, NOISE_OF_RUNS, What, compare_reports};
 pub use conditions::{Conditions, Listener};
 pub use error::CostError;
 pub use findings::cheapest_by_error;

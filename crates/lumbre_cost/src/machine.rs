@@ -12,8 +12,15 @@ pub fn machine(gpu: &Gpu) -> Machine {
         threads: std::thread::available_parallelism().map_or(1, usize::from),
         system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
         adapter: gpu.describe(),
-        version: format!("Lumbre {}, {optimized}", env!("CARGO_PKG_VERSION")),
+        version: format!("Lumbre {}, {optimized}, build {}", env!("CARGO_PKG_VERSION"), build()),
     }
+}
+
+/// Returns the first digits of a hash of the running program's file, by which two builds of one version are
+/// told apart.
+fn build() -> String {
+    let program = std::env::current_exe().and_then(std::fs::read);
+    program.map_or_else(|_| "unknown".to_owned(), |bytes| blake3::hash(&bytes).to_hex()[..12].to_owned())
 }
 
 /// Returns the name of the processor if the system states it in a file, as Linux does, and its architecture

@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::findings::{cost_of, counted, rounded};
-use crate::fronts::front_of;
+use crate::fronts::fronts_by_reference;
 use crate::{CostError, Plot, Point, Quantity, Study};
 
 /// The size of a plot. Text keeps its size in pixels, so that phones need drawings of their own.
@@ -107,8 +107,22 @@ pub fn drawn_series<'a>(study: &'a Study, plot: &Plot) -> Vec<(usize, &'a str)> 
     all.filter(|(_, series)| wanted(series) && has_numbers(series)).collect()
 }
 
-/// Returns a point's two values as displayed, if it has both.
+/// Returns the fronts that a plot draws: one for each reference that its points have.
+pub fn drawn_fronts<'a>(study: &'a Study, plot: &Plot) -> Vec<Vec<&'a Point>> {
+    if !plot.front {
+        return Vec::new();
+    }
+    let series = drawn_series(study, plot);
+    let is_drawn =
+        |point: &&Point| series.iter().any(|(_, name)| *name == point.series) && place(plot, point).is_some();
+    fronts_by_reference(study.points.iter().filter(is_drawn), |point| place(plot, point))
+}
+
+/// Returns a point's two values as displayed, if the plot shows it and it has both.
 fn place(plot: &Plot, point: &Point) -> Option<(f64, f64)> {
+    if plot.varied.as_ref().is_some_and(|name| !point.parameters.contains_key(name)) {
+        return None;
+    }
     let (across, up) = (plot.across.of(point)? * plot.across.shown(), plot.up.of(point)? * plot.up.shown());
     (across.is_finite() && up.is_finite() && across >= 0.0 && up >= 0.0).then_some((across, up))
 }
@@ -159,16 +173,17 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<V
         .map_err(told)?;
     let onto = |(x, y): (f64, f64)| (x.max(across.from), y.max(up.from));
 
-    let front = match plot.front {
-        true => front_of(points.iter().map(|(_, point, _)| *point), |point| place(plot, point)),
-        false => Vec::new(),
-    };
-    let corners: Vec<(f64, f64)> = front.iter().filter_map(|point| place(plot, point)).map(onto).collect();
-    let steps: Vec<(f64, f64)> =
-        corners.iter().zip(corners.iter().skip(1)).flat_map(|(a, b)| [*a, (b.0, a.1), *b]).collect();
+    let fronts = drawn_fronts(study, plot);
     // Labels must not cover lines.
-    let mut lines = vec![steps.clone()];
-    chart.draw_series(DashedLineSeries::new(steps, 4, 4, FRONT.stroke_width(1))).map_err(told)?;
+    let mut lines = Vec::new();
+    for front in &fronts {
+        let corners: Vec<(f64, f64)> =
+            front.iter().filter_map(|point| place(plot, point)).map(onto).collect();
+        let steps: Vec<(f64, f64)> =
+            corners.iter().zip(corners.iter().skip(1)).flat_map(|(a, b)| [*a, (b.0, a.1), *b]).collect();
+        lines.push(steps.clone());
+        chart.draw_series(DashedLineSeries::new(steps, 4, 4, FRONT.stroke_width(1))).map_err(told)?;
+    }
     if plot.equal {
         let ends = [across.from.max(up.from), across.to.min(up.to)].map(|value| (value, value));
         if ends[0] < ends[1] {
@@ -195,7 +210,9 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<V
                 (_, Quantity::Milliseconds) => [(at.0, time.lower), (at.0, time.upper)],
                 _ => continue,
             };
-            chart.draw_series(LineSeries::new(ends.map(onto), style.stroke_width(1))).map_err(told)?;
+            let ends = ends.map(onto);
+            lines.push(ends.to_vec());
+            chart.draw_series(LineSeries::new(ends, style.stroke_width(1))).map_err(told)?;
         }
     }
     let area = chart.plotting_area();
@@ -210,7 +227,7 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<V
         taken.push([x - MARK, y - MARK, x + MARK, y + MARK]);
         mark(root, *color, (x, y)).map_err(told)?;
     }
-    for point in front {
+    for point in fronts.into_iter().flatten() {
         let Some(at) = place(plot, point) else { continue };
         let (x, y) = area.map_coordinate(&onto(at));
         let Some(label) = Label::beside(&point.label, (x, y), size.pixels(), &taken) else { continue };

@@ -29,7 +29,7 @@ pub struct Machine {
     pub system: String,
     /// The GPU or software rasterizer, with its driver.
     pub adapter: String,
-    /// Version of Lumbre, and whether it was built with optimizations.
+    /// Version of Lumbre, whether it was built with optimizations, and a hash of the program's file.
     pub version: String,
 }
 
@@ -74,7 +74,7 @@ pub struct Study {
     /// state it.
     #[serde(default)]
     pub method: u32,
-    /// Version of the program that measured it.
+    /// Version and build of the program that measured it.
     #[serde(default)]
     pub version: String,
 }
@@ -168,9 +168,12 @@ pub struct Plot {
     pub up: Quantity,
     /// The series to be drawn; all of them if empty.
     pub series: Vec<String>,
+    /// If given, only the points that vary the parameter with this name are drawn.
+    #[serde(default)]
+    pub varied: Option<String>,
     /// Whether the points of a series are joined by a line, ordered by the horizontal quantity.
     pub joined: bool,
-    /// Whether the points that no other point beats in both quantities are marked.
+    /// Whether the points that no other point with the same reference beats in both quantities are marked.
     pub front: bool,
     /// Whether a line marks where both quantities are equal.
     pub equal: bool,

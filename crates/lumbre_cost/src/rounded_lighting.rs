@@ -5,7 +5,7 @@
 use bevy_ecs::prelude::*;
 use glam::DVec3;
 use half::f16;
-use lumbre_optics::{Light, LightKind, MINIMUM_DISTANCE, Material};
+use lumbre_optics::{Light, LightKind, MINIMUM_COSINE_DIFFERENCE, MINIMUM_DISTANCE, Material, SpotCosines};
 use lumbre_scene::{Camera, GlobalTransform, Mesh, Projection, SceneSettings};
 
 use crate::picture::Picture;
@@ -19,17 +19,21 @@ use crate::picture::Picture;
 pub struct Format {
     /// Its name.
     pub name: &'static str,
+    /// Number of bits of its significand.
+    pub bits: u32,
     round: fn(f64) -> f64,
 }
 
 /// The formats from the shortest to the longest.
-pub const FORMATS: [Format; 2] = [
-    Format { name: "f16 equations", round: |value| f64::from(f16::from_f64(value)) },
-    Format { name: "f32 equations", round: |value| f64::from(value as f32) },
+pub const FORMATS: [Format; 3] = [
+    Format { name: "f16 equations", bits: 11, round: |value| f64::from(f16::from_f64(value)) },
+    Format { name: "f32 equations", bits: 24, round: |value| f64::from(value as f32) },
+    Format { name: "f64 equations", bits: 53, round: |value| value },
 ];
 
-/// A picture, and the fraction of its pixels for which the format has no finite number. These pixels are
+/// A picture in few bits, and the fraction of its pixels for which the format has no finite number. These pixels are
 /// black.
+#[derive(Clone, Debug)]
 pub struct Rounded {
     /// The radiance of each pixel.
     pub picture: Picture,
@@ -45,6 +49,8 @@ struct Equation {
     light: DVec3,
     is_distant: bool,
     color: DVec3,
+    /// The cone of a spotlight about the unit axis along which it shines.
+    cone: Option<(SpotCosines, DVec3)>,
     /// Reflection coefficients for ambient, diffuse and specular light.
     surface: [DVec3; 3],
     ambient: DVec3,
@@ -72,6 +78,7 @@ pub fn rounded_lighting(world: &mut World, size: (u32, u32), format: Format) -> 
         light: to_light,
         is_distant,
         color: light.diffuse.as_dvec3(),
+        cone: light.spot.map(|cone| (cone.cosines(), place.forward())),
         surface: [front.ambient, front.diffuse, front.specular].map(|color| color.as_dvec3()),
         ambient: settings.ambient.as_dvec3(),
         shininess: f64::from(front.shininess),
@@ -115,6 +122,16 @@ impl Arithmetic {
         self.each(vector / length)
     }
 
+    /// Returns the factor of a smooth cone: the square of a function that is linear in the cosine.
+    fn spot(&self, cone: SpotCosines, axis: DVec3, light: DVec3) -> f64 {
+        let round = self.0;
+        let (outer, inner) = (round(cone.outer), round(cone.inner_or_exponent));
+        let width = round(inner - outer).max(round(MINIMUM_COSINE_DIFFERENCE));
+        let cosine = -self.dot(self.each(axis), light);
+        let angular = round(round(cosine - outer) / width).clamp(0.0, 1.0);
+        round(angular * angular)
+    }
+
     /// Returns ambient, diffuse and Phong's specular light by the documents' equation: E = k_a A + f (k_d L
     /// n·l + k_s L (r·v)ⁿ).
     fn shade(&self, equation: &Equation, point: DVec3) -> DVec3 {
@@ -138,13 +155,16 @@ impl Arithmetic {
         let lobe = if along > 0.0 { round(cosine.powf(round(equation.shininess))) } else { 0.0 };
         let of_diffuse = self.each(self.each(diffuse * color) * along);
         let of_specular = self.each(self.each(specular * color) * lobe);
-        let of_light = self.each(self.each(of_diffuse + of_specular) * attenuation);
+        let inside = equation.cone.map_or(1.0, |(cone, axis)| self.spot(cone, axis, light));
+        let weight = round(attenuation * inside);
+        let of_light = self.each(self.each(of_diffuse + of_specular) * weight);
         self.each(self.each(ambient * self.each(equation.ambient)) + of_light)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use lumbre_optics::SpotCone;
     use lumbre_scene::update_transforms;
     use lumbre_trace::{Integrator, TraceOptions, relative_error, trace};
 
@@ -172,15 +192,16 @@ mod tests {
     /// Without rounding, the result is that of the tracer, which is independent code.
     #[test]
     fn unrounded_it_is_the_traced_sheet() {
-        let unrounded = Format { name: "f64 equations", round: |value| value };
         for asked in [
             Sheet::PLAIN,
             Sheet { height: 0.02, ..Sheet::PLAIN },
             Sheet { grazing: Some(0.01), ..Sheet::PLAIN },
             Sheet { scale: 5e-4, ..Sheet::PLAIN },
             Sheet { scale: 5e4, ..Sheet::PLAIN },
+            Sheet { brightness: 1e6, ..Sheet::PLAIN },
+            Sheet { cone: Some(SpotCone::Smooth { inner: 0.4, outer: 0.6 }), ..Sheet::PLAIN },
         ] {
-            let (error, lost) = error(asked, unrounded);
+            let (error, lost) = error(asked, FORMATS[2]);
             // Colours and meshes of the scene are f32.
             assert!(error < 1e-6 && lost == 0.0, "{asked:?}: {error}, {lost}");
         }
@@ -188,11 +209,18 @@ mod tests {
 
     #[test]
     fn fewer_bits_lose_more_and_large_scenes_have_no_number() {
-        let [(short, none), (long, _)] = FORMATS.map(|format| error(Sheet::PLAIN, format));
+        let [(short, none), (long, _), _] = FORMATS.map(|format| error(Sheet::PLAIN, format));
         // Eleven bits, 24 bits, and a dozen operations.
         assert!((1e-4..2e-2).contains(&short) && none == 0.0, "{short}");
         assert!((1e-9..2e-6).contains(&long), "{long}");
         let (_, lost) = error(Sheet { scale: 5e4, ..Sheet::PLAIN }, FORMATS[0]);
         assert!(lost > 0.9, "{lost}: a square of a hundred kilometres is beyond f16");
+        let (_, lost) = error(Sheet { brightness: 1e6, ..Sheet::PLAIN }, FORMATS[0]);
+        assert!(lost > 0.1, "{lost}: light of a million is beyond f16");
+        // All that a narrow cone lights lies between two cosines that differ by 0.005, ten steps of f16.
+        let far = Sheet { height: 8.0, ..Sheet::PLAIN };
+        let narrow = Sheet { cone: Some(SpotCone::Smooth { inner: 0.0, outer: 0.1 }), ..far };
+        let [(of_narrow, _), (of_all, _)] = [narrow, far].map(|asked| error(asked, FORMATS[0]));
+        assert!(of_narrow > 3.0 * of_all, "{of_narrow} in the cone, {of_all} without one");
     }
 }

@@ -95,6 +95,7 @@ pub fn measure(
             converged: &converged,
             quick: options.quick,
             counts_only: options.counts_only,
+            counts_lights: !options.counts_only,
             size: options.size,
             size_of_report: options.size,
             as_shown: !options.quick,

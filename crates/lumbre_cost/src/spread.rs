@@ -66,6 +66,12 @@ impl Spread {
         self.rounds.min(other.rounds) >= Self::MIN_ROUNDS_TO_DISTINGUISH && self.upper < other.lower
     }
 
+    /// Returns the spread of work that takes this many times as long.
+    pub fn times(&self, factor: f64) -> Self {
+        let Self { lower, median, upper, rounds } = *self;
+        Self { lower: lower * factor, median: median * factor, upper: upper * factor, rounds }
+    }
+
     /// Returns half the width of its range, in milliseconds.
     pub fn half_width(&self) -> f64 {
         0.5 * (self.upper - self.lower)

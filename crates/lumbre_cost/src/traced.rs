@@ -13,8 +13,12 @@ use crate::{Conditions, CostError};
 /// # Errors
 /// [`CostError::Trace`], [`CostError::Load`], [`CostError::Interrupted`].
 pub fn lighting_of(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Picture, CostError> {
-    let options = TraceOptions { depth: Some(0), shadows: false, ..ray_tree(conditions) };
-    Ok(traced(conditions, scene, &options)?.0)
+    Ok(traced(conditions, scene, &lighting_options(conditions))?.0)
+}
+
+/// Returns the options of [`lighting_of`].
+pub fn lighting_options(conditions: &Conditions<'_>) -> TraceOptions {
+    TraceOptions { depth: Some(0), shadows: false, ..ray_tree(conditions) }
 }
 
 /// Returns the options of the ray tree for the pictures of a report.

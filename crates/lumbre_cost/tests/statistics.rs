@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
 use lumbre_cost::{
-    CostReport, ErrorOf, Point, Spread, Study, What, cheapest_by_error, compare_reports, pareto_front,
-    stretches,
+    Change, CostReport, DRIFT_OF_MACHINES, ErrorOf, NOISE_OF_RUNS, Point, Spread, Study, What,
+    cheapest_by_error, compare_reports, pareto_front, stretches,
 };
 
 /// A point of a series: an error as a fraction, and milliseconds with quartiles this far to either side.
@@ -146,18 +146,54 @@ fn report(points: Vec<Point>) -> CostReport {
 #[test]
 fn a_planted_slow_down_is_found_and_noise_is_not() {
     let before = report(vec![point("final", "a", 0.01, 10.0, 1.0), point("final", "b", 0.02, 5.0, 1.0)]);
-    let slower = report(vec![point("final", "a", 0.01, 15.0, 1.0), point("final", "b", 0.02, 5.9, 1.0)]);
+    let slower = report(vec![point("final", "a", 0.01, 20.0, 1.0), point("final", "b", 0.02, 5.9, 1.0)]);
     let changes = compare_reports(&before, &slower, 1.1);
     assert_eq!(changes.len(), 1, "{changes:?}");
     assert!(changes[0].is_slower() && !changes[0].is_worse());
     assert_eq!(
         changes[0].to_string(),
-        "bake, final, a: 15.0 ± 1.00 ms instead of 10.0 ± 1.00 ms (1.50 times)"
+        "bake, final, a: 20.0 ± 1.00 ms instead of 10.0 ± 1.00 ms (2.00 times)"
     );
     // In the other direction it is a change, but not for the worse.
     let back = compare_reports(&slower, &before, 1.1);
     assert!(back.len() == 1 && !back[0].is_slower() && !back[0].is_worse(), "{back:?}");
-    assert!(compare_reports(&before, &slower, 2.0).is_empty());
+    assert!(compare_reports(&before, &slower, 2.5).is_empty());
+}
+
+/// Two dozen points, of which each takes `drift` times as long as usual, up to a tenth more or less.
+fn drifted(drift: f64) -> CostReport {
+    let times = (0..24).map(|number: u32| {
+        let noise = 1.0 + 0.1 * f64::from((7 * number) % 11).sin();
+        let usual = 2.0 + 3.0 * f64::from(number);
+        let ms = if drift == 1.0 { usual } else { usual * drift * noise };
+        point("final", &format!("{number}"), 0.01, ms, 0.02 * ms)
+    });
+    report(times.collect())
+}
+
+#[test]
+fn a_drift_of_the_machine_is_no_slow_down_and_one_slower_point_is_found_in_it() {
+    let before = drifted(1.0);
+    for drift in [1.75, 0.5, 1.01] {
+        let after = drifted(drift);
+        let same = compare_reports(&before, &after, 1.1);
+        assert!(!same.iter().any(Change::is_slower), "{drift}: {same:?}");
+        let named = same.iter().filter(|change| matches!(change.what, What::Drift { .. })).count();
+        assert_eq!((named, same.len()), (usize::from(drift != 1.01), usize::from(drift != 1.01)), "{same:?}");
+        for planted in [0, 9, 23] {
+            let mut slower = after.clone();
+            let point = &mut slower.studies[0].points[planted];
+            point.milliseconds = point.milliseconds.map(|time| time.times(1.3 * NOISE_OF_RUNS));
+            let found = compare_reports(&before, &slower, 1.1);
+            let slow: Vec<&Change> = found.iter().filter(|change| change.is_slower()).collect();
+            assert!(slow.len() == 1 && slow[0].point == format!("final, {planted}"), "{drift}: {found:?}");
+            assert!(slow[0].to_string().contains("times relative to its study"), "{}", slow[0]);
+        }
+    }
+    // A program that is slower in all points is found if no machine drifts so far.
+    let found = compare_reports(&before, &drifted(1.2 * DRIFT_OF_MACHINES), 1.1);
+    assert!(found.len() == 1 && found[0].is_slower(), "{found:?}");
+    assert!(found[0].to_string().starts_with("bake: its 24 times are "), "{}", found[0]);
 }
 
 #[test]

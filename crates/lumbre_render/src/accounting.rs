@@ -220,6 +220,23 @@ impl Accounting {
         );
     }
 
+    /// Copies the shader invocations, pass by pass and effect by effect, of another frame of the same scene:
+    /// counting them slows a frame down, too.
+    pub fn take_invocations_of(&mut self, counted: &Self) {
+        for pass in &mut self.passes {
+            let same = counted.passes.iter().find(|other| other.pass == pass.pass);
+            pass.invocations = same.and_then(|same| same.invocations);
+        }
+        for effect in &mut self.effects {
+            let passes = self.passes.iter().filter(|pass| effect.passes.contains(&pass.pass));
+            effect.invocations = passes.filter_map(|pass| pass.invocations).reduce(|sum, own| Invocations {
+                vertex: sum.vertex + own.vertex,
+                fragment: sum.fragment + own.fragment,
+                compute: sum.compute + own.compute,
+            });
+        }
+    }
+
     /// Formats the account as text: stages, passes, their sum, effects.
     pub fn to_text(&self) -> String {
         let mut text = String::new();

@@ -5,7 +5,7 @@ mod tables;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::plot::{PlotSize, SERIES_COLORS, draw_plot, drawn_series};
+use crate::plot::{PlotSize, SERIES_COLORS, draw_plot, drawn_fronts, drawn_series};
 use crate::{CostError, CostReport, Plot, Study};
 
 /// Returns the bytes of a PNG or JPEG by the name with which a point refers to its picture; `None` if it does
@@ -111,8 +111,10 @@ fn plot_figure(study: &Study, plot: &Plot) -> Result<Markup, CostError> {
                 @for (place, series) in drawn_series(study, plot) {
                     li { (legend_mark(place)) (series) }
                 }
-                @if plot.front {
-                    li { span class="front" {} "not beaten in both quantities" }
+                @match drawn_fronts(study, plot).len() {
+                    0 => {}
+                    1 => { li { span class="front" {} "not beaten in both quantities" } }
+                    _ => { li { span class="front" {} "not beaten in both quantities by others with the same reference" } }
                 }
                 @if plot.equal {
                     li { span class="front" {} "equal" }

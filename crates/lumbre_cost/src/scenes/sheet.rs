@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::{Light, Material, Surface};
+use lumbre_optics::{Light, Material, SpotCone, Surface};
 use lumbre_scene::{Camera, Mesh, Name, Projection, SceneSettings, Transform};
 
 /// The parameters that make the arithmetic hard.
@@ -20,13 +20,25 @@ pub struct Sheet {
     pub shininess: f32,
     /// Height of the lamp over the sheet in metres, before scaling.
     pub height: f64,
+    /// Factor on the lamp's light.
+    pub brightness: f32,
+    /// The lamp's cone towards the middle of the sheet; `None` if it shines everywhere.
+    pub cone: Option<SpotCone>,
     /// Angle of a distant light over the horizon in radians; `None` for a lamp.
     pub grazing: Option<f64>,
 }
 
 impl Sheet {
     /// The parameters of an easy scene.
-    pub const PLAIN: Self = Self { far: 0.0, scale: 1.0, shininess: 20.0, height: 0.8, grazing: None };
+    pub const PLAIN: Self = Self {
+        far: 0.0,
+        scale: 1.0,
+        shininess: 20.0,
+        height: 0.8,
+        brightness: 1.0,
+        cone: None,
+        grazing: None,
+    };
 }
 
 /// Creates the sheet, seen obliquely from above.
@@ -56,8 +68,11 @@ pub fn sheet(asked: Sheet) -> World {
         None => {
             // The illuminance is the same at any scale and height.
             let reach = asked.height * asked.scale;
-            let lamp = Light::point(Vec3::splat((0.6 * reach * reach) as f32));
-            world.spawn((Name::new("lamp"), lamp, Transform::from_translation(at(DVec3::Y * asked.height))));
+            let light = Vec3::splat((0.6 * reach * reach) as f32 * asked.brightness);
+            let lamp = asked.cone.map_or_else(|| Light::point(light), |cone| Light::spot(light, cone));
+            let above = Transform::from_translation(at(DVec3::Y * asked.height));
+            let place = above.looking_at(at(DVec3::ZERO), DVec3::Z);
+            world.spawn((Name::new("lamp"), lamp, place));
         }
     }
     let eye =

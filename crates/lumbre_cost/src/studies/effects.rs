@@ -83,9 +83,7 @@ fn of_scene(
 ) -> Result<(), CostError> {
     let mut whole = scene.open(conditions.aspect())?;
     let effects = removable_effects(&Census::of(&mut whole), &FrameOptions::default());
-    // Counting needs shader variants of its own, so only the frame with all effects is counted.
-    let whole = Frame::new(whole, FrameOptions::default()).sharing("effects");
-    let mut frames = vec![whole.counting_lights(!conditions.quick)];
+    let mut frames = vec![Frame::new(whole, FrameOptions::default()).sharing("effects")];
     for effect in &effects {
         let (mut world, mut options) = (scene.open(conditions.aspect())?, FrameOptions::default());
         effect.remove(&mut world, &mut options);

@@ -120,8 +120,6 @@ fn by_number(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<Tim
         for (light_lists, name) in LISTS {
             let options = found_by(light_lists);
             let frame = Frame::new(scene.open(conditions.aspect())?, options);
-            // Counting takes longer the longer the lists are. The counts for all lamps are known without it.
-            let frame = frame.counting_lights(!conditions.quick && light_lists == LightLists::Clusters);
             frames.push(if lamps <= SHARING { frame.sharing(name) } else { frame });
         }
     }
@@ -239,7 +237,7 @@ fn by_tile(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), C
     for &finest_cluster_tile in tiles {
         let options = FrameOptions { finest_cluster_tile, ..found_by(LightLists::Clusters) };
         let frame = Frame::new(scene.open(conditions.aspect())?, options);
-        frames.push(frame.sharing(SIZED).counting_lights(!conditions.quick));
+        frames.push(frame.sharing(SIZED));
     }
     let drawn = draw_frames(conditions, frames, 0.3 * SECONDS, [0.5, 0.65])?;
     let reference = measured.file_name(&everywhere(lamps));

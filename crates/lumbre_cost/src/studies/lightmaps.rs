@@ -160,6 +160,7 @@ fn of_scene(
     let first = measured.study.points.len();
     for (mut point, frame) in points.into_iter().zip(&drawn) {
         point.milliseconds = frame.spread();
+        point.counts.extend(frame.counts());
         measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
     }
     let finding = finding(&scene.name, &measured.study.points[first..]);

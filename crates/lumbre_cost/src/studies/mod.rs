@@ -87,14 +87,14 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind {
         name: "reflection",
         about: "reflection models, compared with Phong's",
-        method: 2,
+        method: 3,
         run: reflection::run,
     },
     StudyKind { name: "lightmaps", about: "density and format of lightmaps", method: 2, run: lightmaps::run },
     StudyKind {
         name: "precision",
         about: "f32 on the device, compared with f64",
-        method: 2,
+        method: 3,
         run: precision::run,
     },
 ];

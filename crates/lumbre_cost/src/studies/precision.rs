@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use half::f16;
-use lumbre_optics::{decode_srgb, encode_srgb};
+use lumbre_optics::{SpotCone, decode_srgb, encode_srgb};
 use lumbre_render::FrameOptions;
 
 use crate::findings::{listed, milliseconds, percent, rounded};
@@ -13,18 +13,23 @@ use crate::frame::Frame;
 use crate::frames::draw_frames;
 use crate::measured::Measured;
 use crate::picture::Picture;
-use crate::rounded_lighting::{FORMATS, rounded_lighting};
+use crate::rounded_lighting::{FORMATS, Rounded, rounded_lighting};
 use crate::rounds::{Repeated, milliseconds_since, repeated};
 use crate::scene_file::SceneFile;
 use crate::scenes::{Sheet, sheet};
-use crate::traced::lighting_of;
+use crate::traced::{lighting_options, traced};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// The cases with their names.
-const CASES: [(&str, Sheet); 7] = [
+const CASES: [(&str, Sheet); 9] = [
     ("plain", Sheet::PLAIN),
     ("exponent 50000", Sheet { shininess: 50_000.0, ..Sheet::PLAIN }),
     ("lamp at 2 cm", Sheet { height: 0.02, ..Sheet::PLAIN }),
+    ("lamp a million times as bright", Sheet { brightness: 1e6, ..Sheet::PLAIN }),
+    (
+        "narrow spotlight",
+        Sheet { height: 8.0, cone: Some(SpotCone::Smooth { inner: 0.0, outer: 0.1 }), ..Sheet::PLAIN },
+    ),
     ("light at 0.1°", Sheet { grazing: Some(0.001_745_329), ..Sheet::PLAIN }),
     ("10000 km away", Sheet { far: 1e7, ..Sheet::PLAIN }),
     ("a millimetre large", Sheet { scale: 5e-4, ..Sheet::PLAIN }),
@@ -35,6 +40,7 @@ const F32: &str = "f32 frame";
 const F16: &str = "the frame kept in f16";
 const EIGHT: &str = "the frame kept in eight bits";
 const F64: &str = "f64 rays";
+const BITS: &str = "bits of the significand";
 const LOST: &str = "pixels without a number, %";
 
 /// Runs the study.
@@ -58,20 +64,29 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         scenes.push(scene);
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [0.0, 0.5])?;
-    let traced = repeated(CASES.len(), conditions.repetitions(), |place, [from, _]| {
-        conditions.tell(0.5 + 0.5 * from)?;
+    let rays = repeated(CASES.len(), conditions.repetitions(), |place, [from, _]| {
+        conditions.tell(0.5 + 0.3 * from)?;
         let begun = Instant::now();
-        let exact = lighting_of(conditions, &scenes[place])?;
-        Ok((milliseconds_since(begun), exact))
+        let traced = traced(conditions, &scenes[place], &lighting_options(conditions))?;
+        Ok((milliseconds_since(begun), traced))
     })?;
-    for ((name, _), ((scene, frame), Repeated { times, made: exact })) in
-        CASES.iter().zip(scenes.iter().zip(&drawn).zip(traced))
+    let equations = repeated(CASES.len() * FORMATS.len(), conditions.repetitions(), |place, [from, _]| {
+        conditions.tell(0.8 + 0.2 * from)?;
+        let mut world = scenes[place / FORMATS.len()].open(conditions.aspect())?;
+        let begun = Instant::now();
+        let rounded = rounded_lighting(&mut world, conditions.size, FORMATS[place % FORMATS.len()]);
+        Ok((milliseconds_since(begun), rounded))
+    })?;
+    let pixels = f64::from(conditions.size.0) * f64::from(conditions.size.1);
+    for (((name, _), equations), ((scene, frame), Repeated { times, made: (exact, report) })) in
+        CASES.iter().zip(equations.chunks(FORMATS.len())).zip(scenes.iter().zip(&drawn).zip(rays))
     {
         let reference = measured.keep_reference(&format!("f64 {name}"), exact.clone());
         let size = conditions.size_text();
-        let point = |series: &str, time, command: String| Point {
+        let point = |series: &str, bits: u32, time, command: String| Point {
             series: series.into(),
             label: (*name).into(),
+            parameters: [(BITS.to_owned(), f64::from(bits))].into(),
             milliseconds: time,
             command,
             ..Point::default()
@@ -83,24 +98,32 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         );
         // No command stores a frame in fewer bits.
         let kept = [
-            (F32, frame.picture.clone(), draw),
-            (F16, in_halves(&frame.picture), conditions.again("precision")),
-            (EIGHT, in_bytes(&frame.picture), conditions.again("precision")),
+            (F32, 24, Rounded { picture: frame.picture.clone(), lost: 0.0 }, draw),
+            (F16, 11, in_halves(&frame.picture), conditions.again("precision")),
+            (
+                EIGHT,
+                8,
+                Rounded { picture: in_bytes(&frame.picture), lost: 0.0 },
+                conditions.again("precision"),
+            ),
         ];
-        for (series, picture, command) in kept {
-            let mut point = point(series, frame.spread(), command);
+        for (series, bits, Rounded { picture, lost }, command) in kept {
+            let mut point = point(series, bits, frame.spread(), command);
             point.counts = frame.counts();
+            point.figures.insert(LOST.into(), 100.0 * lost);
             measured.add_picture(point, picture, &reference, ErrorOver::Picture)?;
         }
-        for format in FORMATS {
-            let mut world = scene.open(conditions.aspect())?;
-            let Some(rounded) = rounded_lighting(&mut world, conditions.size, format) else { continue };
-            // The equations are evaluated and rounded on the CPU, so there is no time of a device.
-            let mut point = point(format.name, None, conditions.again("precision"));
-            point.figures.insert(LOST.into(), 100.0 * rounded.lost);
-            measured.add_picture(point, rounded.picture, &reference, ErrorOver::Picture)?;
+        for (format, Repeated { times, made: rounded }) in FORMATS.iter().zip(equations) {
+            let Some(Rounded { picture, lost }) = rounded else { continue };
+            let mut point = point(format.name, format.bits, Spread::of(times), conditions.again("precision"));
+            point.figures.insert(LOST.into(), 100.0 * lost);
+            // There is one light, which every pixel evaluates.
+            point.counts.insert("light evaluations".into(), pixels);
+            measured.add_picture(point, picture.clone(), &reference, ErrorOver::Picture)?;
         }
-        measured.add_picture(point(F64, Spread::of(&times), trace), exact, &reference, ErrorOver::Picture)?;
+        let mut point = point(F64, 53, Spread::of(&times), trace);
+        point.counts.insert("rays".into(), report.rays as f64);
+        measured.add_picture(point, exact, &reference, ErrorOver::Picture)?;
     }
     measured.study.findings = findings(&measured.study);
     Ok(measured)
@@ -111,16 +134,25 @@ fn study() -> Study {
         name: "precision".into(),
         title: "f32 on the device, compared with f64".into(),
         question: "A sheet that fills the frame is lit in ways that are hard for arithmetic. What do frames in 32 bits lose, and what is lost by storing them in 16 or eight? What would plain equations lose in 16 and in 32 bits, and what would 64 bits cost, by tracing rays?".into(),
-        reference: "the same lighting equation at the same pixels, traced in f64".into(),
-        plots: vec![Plot {
-            title: "Error over time".into(),
-            across: Quantity::Milliseconds,
-            up: Quantity::Error,
-            front: true,
-            ..Plot::default()
-        }],
+        reference: "the same lighting equation at the same pixels, traced in f64, which is therefore without error; equations in f64 are other code, and show how far the two agree".into(),
+        plots: vec![
+            Plot {
+                title: "Error over time, with a front for each case".into(),
+                across: Quantity::Milliseconds,
+                up: Quantity::Error,
+                series: [F32, F16, EIGHT, F64].map(str::to_owned).into(),
+                front: true,
+                ..Plot::default()
+            },
+            Plot {
+                title: "Error over the bits of a number".into(),
+                across: Quantity::Parameter(BITS.into()),
+                up: Quantity::Error,
+                ..Plot::default()
+            },
+        ],
         notes: vec![
-            "The equations in f16 and f32 are rounded after every operation, without the renderer's measures for hard cases; positions are relative to the eye. Pixels for which the format has no finite number are black."
+            "The equations in f16, f32 and f64 are rounded after every operation, without the renderer's measures for hard cases; positions are relative to the eye. Pixels for which the format has no finite number are black. Their times are those of one CPU thread that computes in f64 and rounds: they say what this costs here, and not what a device with such numbers would take."
                 .into(),
         ],
         ..Study::default()
@@ -132,8 +164,12 @@ fn each_channel(picture: &Picture, kept: impl Fn(f64) -> f64) -> Picture {
     Picture { width: picture.width, radiance }
 }
 
-fn in_halves(picture: &Picture) -> Picture {
-    each_channel(picture, |value| f64::from(f16::from_f64(value)))
+/// Rounds to half floats. Pixels that are beyond their range are black.
+fn in_halves(picture: &Picture) -> Rounded {
+    let mut kept = each_channel(picture, |value| f64::from(f16::from_f64(value)));
+    let beyond = kept.radiance.iter_mut().filter(|pixel| !pixel.is_finite());
+    let lost = beyond.map(|pixel| *pixel = DVec3::ZERO).count();
+    Rounded { lost: lost as f64 / kept.radiance.len().max(1) as f64, picture: kept }
 }
 
 /// Rounds to eight bits in sRGB encoding, as for a screen, without a tone curve.
@@ -144,7 +180,7 @@ fn in_bytes(picture: &Picture) -> Picture {
 /// Reports what plain equations lose in f16, and in f32 compared with the device's frames.
 fn of_equations(study: &Study) -> Vec<String> {
     let error = |point: &Point| point.error.map_or(0.0, |error| error.relative_rmse);
-    let [short, long] = FORMATS.map(|format| study.of_series(format.name).collect::<Vec<_>>());
+    let [short, long, exact] = FORMATS.map(|format| study.of_series(format.name).collect::<Vec<_>>());
     let mut findings = Vec::new();
     if let Some(plain) = short.iter().find(|point| point.label == CASES[0].0) {
         let is_lost = |point: &&&Point| point.figures.get(LOST).is_some_and(|lost| *lost > 0.0);
@@ -153,6 +189,13 @@ fn of_equations(study: &Study) -> Vec<String> {
         findings.push(format!(
             "The error of the equations in f16 is {} in the easy case; cases with pixels for which f16 has no finite number: {none}.",
             percent(error(plain))
+        ));
+    }
+    if let Some(most) = exact.iter().max_by(|a, b| error(a).total_cmp(&error(b))) {
+        findings.push(format!(
+            "The equations in f64 agree with the traced reference within {} in every case (\"{}\" is the farthest off).",
+            percent(error(most)),
+            most.label
         ));
     }
     // The case in which the device's frame is better than plain f32 by the largest factor shows what avoiding

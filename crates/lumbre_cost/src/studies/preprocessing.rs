@@ -40,24 +40,34 @@ const BEFORE: &str = "baked before, ms";
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    over_scenes(conditions, study(), ("room", Air::Clear), |scene, told, measured| {
+    over_scenes(conditions, study(conditions), ("room", Air::Clear), |scene, told, measured| {
         of_scene(conditions, scene, told, measured)
     })
 }
 
-fn study() -> Study {
+fn study(conditions: &Conditions<'_>) -> Study {
+    let plot = |title: &str, series: &[&str]| Plot {
+        title: title.into(),
+        across: Quantity::Milliseconds,
+        up: Quantity::Error,
+        series: series.iter().map(|name| (*name).to_owned()).collect(),
+        front: true,
+        ..Plot::default()
+    };
+    // With several files, series have the names of their scenes.
+    let plots = match conditions.files.len() > 1 {
+        true => vec![plot("Error over time", &[])],
+        false => vec![
+            plot("Frames: error over time", &[FRAME]),
+            plot("Bakes after a change: error over time", &[BAKE]),
+        ],
+    };
     Study {
         name: "preprocessing".into(),
         title: "Interreflected light, baked before the game".into(),
         question: "Interreflected light is baked once and read in every frame. What does it cost a frame, how long does the bake take, and how long does it take again when something has moved?".into(),
         reference: "for frames, the frame with the lightmaps of a converged bake; for bakes after a change, a converged bake of the changed level, whose own noise is subtracted".into(),
-        plots: vec![Plot {
-            title: "Error over time".into(),
-            across: Quantity::Milliseconds,
-            up: Quantity::Error,
-            front: true,
-            ..Plot::default()
-        }],
+        plots,
         ..Study::default()
     }
 }

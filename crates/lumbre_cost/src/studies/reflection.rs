@@ -1,6 +1,7 @@
 //! Study of reflection models compared with Phong's: how far their highlights differ over exponents and
 //! angles of incidence, and what they cost.
 
+use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_optics::{Lobe, ReflectionModel, Surface, SurfaceSample, specular_reflection};
 use lumbre_render::FrameOptions;
@@ -10,7 +11,7 @@ use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
-use crate::scenes::{Ball, ball};
+use crate::scenes::{Ball, Highlight, ball, highlight};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 const EXPONENTS: &[f32] = &[4.0, 16.0, 64.0, 256.0];
@@ -32,11 +33,18 @@ struct Variant {
     lobe: Lobe,
 }
 
-/// Angles between light and normal, in degrees.
+/// Angles between light and normal in degrees for which the lobes themselves are compared.
 const INCIDENCES: [f64; 4] = [0.0, 30.0, 60.0, 80.0];
+/// Angles between light and normal in degrees at which a sheet is drawn.
+const TILTS: &[f64] = &[10.0, 20.0, 40.0, 60.0, 70.0, 80.0];
+const FEW_TILTS: &[f64] = &[10.0, 60.0];
+const INCIDENCE: &str = "angle of incidence, degrees";
+/// Exponent of the sheet's highlight.
+const EXPONENT_OF_SHEET: f32 = 64.0;
 /// Subdivision depth, fine enough to hide the facets.
 const DEPTH: u32 = 6;
-const SECONDS: f64 = 8.0;
+/// Seconds for all frames of a full report.
+const SECONDS: f64 = 14.0;
 
 /// Runs the study.
 ///
@@ -45,19 +53,70 @@ const SECONDS: f64 = 8.0;
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
     let mut measured = Measured { study: study(), ..Measured::default() };
     if !conditions.files.is_empty() {
-        measured.study.notes.push("The scene files were not used: this study always measures a ball.".into());
+        measured
+            .study
+            .notes
+            .push("The scene files were not used: this study always measures a ball and a sheet.".into());
     }
-    let exponents = conditions.unless_quick(EXPONENTS, FEW_EXPONENTS);
+    let exponents = conditions.unless_quick(EXPONENTS, FEW_EXPONENTS).iter().map(|&shininess| Subject {
+        made: |shininess, _, lobe| {
+            ball(Ball { depth: DEPTH, shininess, reflection: ReflectionModel::Phong, lobe })
+        },
+        name: format!("ball-exponent-{shininess}"),
+        label: format!("exponent {shininess}"),
+        parameter: (EXPONENT, f64::from(shininess)),
+        shininess,
+        incidences: &INCIDENCES,
+    });
+    let exponents: Vec<Subject> = exponents.collect();
+    let drawn = of_subjects(conditions, &exponents, [0.0, 0.6], &mut measured)?;
+    let incidences = conditions.unless_quick(TILTS, FEW_TILTS).iter().map(|degrees| Subject {
+        made: |shininess, degrees, lobe| {
+            highlight(Highlight { incidence: degrees.to_radians(), shininess, lobe })
+        },
+        name: format!("highlight-at-{degrees}"),
+        label: format!("incidence {degrees}°"),
+        parameter: (INCIDENCE, *degrees),
+        shininess: EXPONENT_OF_SHEET,
+        incidences: std::slice::from_ref(degrees),
+    });
+    let incidences: Vec<Subject> = incidences.collect();
+    of_subjects(conditions, &incidences, [0.6, 1.0], &mut measured)?;
+    measured.study.findings = findings(&measured.study, &drawn);
+    Ok(measured)
+}
+
+/// A scene that is drawn under every model.
+struct Subject {
+    /// Creates it from an exponent, an angle of incidence in degrees and a lobe.
+    made: fn(f32, f64, Lobe) -> World,
+    /// The name of its file.
+    name: String,
+    /// The label of its points.
+    label: String,
+    /// What is varied, with its value.
+    parameter: (&'static str, f64),
+    shininess: f32,
+    /// Angles of incidence in degrees for which the lobes themselves are compared.
+    incidences: &'static [f64],
+}
+
+/// Draws every subject under every model, and adds their points.
+fn of_subjects(
+    conditions: &Conditions<'_>,
+    subjects: &[Subject],
+    told: [f64; 2],
+    measured: &mut Measured,
+) -> Result<Vec<DrawnFrame>, CostError> {
     let variants = variants();
     let mut frames = Vec::new();
     let mut scenes: Vec<Vec<SceneFile>> = Vec::new();
-    for &shininess in exponents {
-        let made = |lobe: Lobe, name: String| {
-            let asked = Ball { depth: DEPTH, shininess, reflection: ReflectionModel::Phong, lobe };
-            SceneFile::made(conditions, &name, ball(asked))
+    for subject in subjects {
+        let made = |lobe: Lobe, name: &str| {
+            SceneFile::made(conditions, name, (subject.made)(subject.shininess, subject.parameter.1, lobe))
         };
-        let bare = made(Lobe::Bare, format!("ball-exponent-{shininess}"))?;
-        let conserving = made(Lobe::EnergyConserving, format!("ball-exponent-{shininess}-energy-keeping"))?;
+        let bare = made(Lobe::Bare, &subject.name)?;
+        let conserving = made(Lobe::EnergyConserving, &format!("{}-energy-keeping", subject.name))?;
         let of =
             |variant: &Variant| if variant.lobe == Lobe::Bare { bare.clone() } else { conserving.clone() };
         let own: Vec<SceneFile> = variants.iter().map(of).collect();
@@ -67,17 +126,16 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         }
         scenes.push(own);
     }
-    let drawn = draw_frames(conditions, frames, SECONDS, [0.0, 1.0])?;
-    for ((scenes, &shininess), drawn) in scenes.iter().zip(exponents).zip(drawn.chunks(variants.len())) {
+    let drawn = draw_frames(conditions, frames, SECONDS * (told[1] - told[0]), told)?;
+    for ((scenes, subject), drawn) in scenes.iter().zip(subjects).zip(drawn.chunks(variants.len())) {
         let reference =
-            measured.keep_reference(&format!("Phong exponent {shininess}"), drawn[0].picture.clone());
+            measured.keep_reference(&format!("Phong {}", subject.label), drawn[0].picture.clone());
         for ((&variant, scene), frame) in variants.iter().zip(scenes).zip(drawn) {
-            let point = point(conditions, scene, variant, shininess, frame);
+            let point = point(conditions, scene, variant, subject, frame);
             measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
         }
     }
-    measured.study.findings = findings(&measured.study, &drawn);
-    Ok(measured)
+    Ok(drawn)
 }
 
 fn study() -> Study {
@@ -85,7 +143,7 @@ fn study() -> Study {
         name: "reflection".into(),
         title: "Reflection models compared with Phong's".into(),
         question: "Blinn's half vector with Phong's exponent, with four times that exponent, with a matched exponent or with an energy-conserving lobe, and the microfacets of Torrance and Sparrow: how much do their highlights differ from Phong's, and do they cost more, as document [M] says of Blinn's?".into(),
-        reference: "the same ball under Phong's model with the same exponent".into(),
+        reference: "the same ball or sheet under Phong's model with the same exponent and the same light".into(),
         plots: vec![
             Plot {
                 title: "Difference from Phong's highlight".into(),
@@ -99,6 +157,21 @@ fn study() -> Study {
                 across: Quantity::Parameter(EXPONENT.into()),
                 up: Quantity::Milliseconds,
                 joined: true,
+                ..Plot::default()
+            },
+            Plot {
+                title: "Difference from Phong's highlight on a sheet, over incidence".into(),
+                across: Quantity::Parameter(INCIDENCE.into()),
+                up: Quantity::Error,
+                joined: true,
+                ..Plot::default()
+            },
+            Plot {
+                title: "Error over time, with a front for each incidence".into(),
+                across: Quantity::Milliseconds,
+                up: Quantity::Error,
+                varied: Some(INCIDENCE.into()),
+                front: true,
                 ..Plot::default()
             },
         ],
@@ -121,17 +194,21 @@ fn point(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
     variant: Variant,
-    shininess: f32,
+    subject: &Subject,
     frame: &DrawnFrame,
 ) -> Point {
-    let over_incidences = INCIDENCES.iter().map(|degrees| {
-        let apart = lobes_apart(variant, shininess, degrees.to_radians());
-        (format!("off at {degrees}°, %"), 100.0 * apart)
+    let over_incidences = subject.incidences.iter().map(|degrees| {
+        let apart = lobes_apart(variant, subject.shininess, degrees.to_radians());
+        let name = match subject.incidences.len() {
+            1 => "off over all directions, %".to_owned(),
+            _ => format!("off at {degrees}°, %"),
+        };
+        (name, 100.0 * apart)
     });
     Point {
         series: name_of(variant).into(),
-        label: format!("exponent {shininess}"),
-        parameters: [(EXPONENT.to_owned(), f64::from(shininess))].into(),
+        label: subject.label.clone(),
+        parameters: [(subject.parameter.0.to_owned(), subject.parameter.1)].into(),
         milliseconds: frame.spread(),
         counts: frame.counts(),
         figures: over_incidences.collect(),
@@ -165,6 +242,39 @@ fn lobes_apart(variant: Variant, shininess: f32, incidence: f64) -> f64 {
     (squares / of_phong.max(f64::MIN_POSITIVE)).sqrt()
 }
 
+/// Returns the errors of a model's points that vary a parameter, with its values.
+fn errors_over<'a>(
+    study: &'a Study,
+    series: &'a str,
+    parameter: &'a str,
+) -> impl Iterator<Item = (f64, f64)> + 'a {
+    let value = move |point: &Point| Some((*point.parameters.get(parameter)?, point.error?.relative_rmse));
+    study.of_series(series).filter_map(value)
+}
+
+/// Reports how far each model's highlight on a sheet is from Phong's, from the steepest light to the lowest.
+fn of_incidences(study: &Study) -> Option<String> {
+    let told = variants().into_iter().skip(1).filter_map(|variant| {
+        let errors: Vec<(f64, f64)> = errors_over(study, name_of(variant), INCIDENCE).collect();
+        let ((_, first), (_, last)) = (errors.first()?, errors.last()?);
+        let (at, most) = errors.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(format!(
+            "{} from {} to {} (at most {}, at {at}°)",
+            name_of(variant),
+            percent(*first),
+            percent(*last),
+            percent(*most)
+        ))
+    });
+    let told: Vec<String> = told.collect();
+    let mut angles = errors_over(study, name_of(variants()[0]), INCIDENCE).map(|(angle, _)| angle);
+    let (first, last) = (angles.next()?, angles.last()?);
+    Some(format!(
+        "Errors of highlights of exponent {EXPONENT_OF_SHEET} on a sheet, from {first}° of incidence to {last}°: {}.",
+        told.join("; ")
+    ))
+}
+
 fn findings(study: &Study, drawn: &[DrawnFrame]) -> Vec<String> {
     let variants = variants();
     let mut costs = Vec::new();
@@ -177,8 +287,7 @@ fn findings(study: &Study, drawn: &[DrawnFrame]) -> Vec<String> {
         if let Some(ratio) = Spread::of_median(&ratios) {
             costs.push(format!("{name} takes {} of Phong's time", factor(&ratio)));
         }
-        let errors = study.of_series(name).filter_map(|point| point.error);
-        let largest = errors.map(|error| error.relative_rmse).fold(0.0, f64::max);
+        let largest = errors_over(study, name, EXPONENT).map(|(_, error)| error).fold(0.0, f64::max);
         if nearest.is_none_or(|(_, least)| largest < least) {
             nearest = Some((name, largest));
         }
@@ -190,5 +299,6 @@ fn findings(study: &Study, drawn: &[DrawnFrame]) -> Vec<String> {
             percent(error)
         ));
     }
+    findings.extend(of_incidences(study));
     findings
 }

@@ -98,8 +98,7 @@ fn of_scene(
         for &shading in Shading::ALL {
             let world = subject.open(conditions.aspect())?;
             let options = FrameOptions { shading: Some(shading), shadows: false, ..FrameOptions::default() };
-            let frame = Frame::new(world, options).sharing(shading.name());
-            frames.push(frame.counting_lights(!conditions.quick));
+            frames.push(Frame::new(world, options).sharing(shading.name()));
         }
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [part(0.1), after])?;

@@ -33,8 +33,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         for &shading in Shading::ALL {
             let world = subject.scene.open(conditions.aspect())?;
             let options = FrameOptions { shading: Some(shading), shadows: false, ..FrameOptions::default() };
-            let frame = Frame::new(world, options).sharing(shading.name());
-            frames.push(frame.counting_lights(!conditions.quick));
+            frames.push(Frame::new(world, options).sharing(shading.name()));
         }
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [0.1, 1.0])?;

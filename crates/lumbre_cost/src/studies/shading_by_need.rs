@@ -60,8 +60,7 @@ fn of_scene(
     let mut frames = Vec::new();
     for shading in &all {
         let options = FrameOptions { shading: Some(*shading), ..FrameOptions::default() };
-        let frame = Frame::new(scene.open(conditions.aspect())?, options).sharing("need");
-        frames.push(frame.counting_lights(!conditions.quick));
+        frames.push(Frame::new(scene.open(conditions.aspect())?, options).sharing("need"));
     }
     let drawn = draw_frames(conditions, frames, SECONDS, told)?;
     let reference = measured.keep_reference(&format!("{} Phong", scene.name), drawn[0].picture.clone());

@@ -88,6 +88,7 @@ pub fn tune(
         converged: &converged,
         quick: options.quick,
         counts_only: false,
+        counts_lights: false,
         size: options.size,
         size_of_report: options.size,
         as_shown: true,
