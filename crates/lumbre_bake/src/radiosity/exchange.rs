@@ -12,12 +12,13 @@ use super::sampling_guide::SamplingGuide;
 use super::size_error::size_error;
 use super::solution::gather;
 use crate::chunks::in_chunks;
-use crate::monitor::{BakeMonitor, Stage};
+use crate::monitor::BakeMonitor;
 use crate::options::Solver;
 use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, Receiver};
 use crate::sources::light_sources::Sources;
+use crate::stage::Stage;
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// The light of all patches, which the final gather reads.
