@@ -6,11 +6,11 @@
 //! the mean. The result is not an exact solution: it comes from a few random walks through the scene, which read direct
 //! light where they hit. As no eye fits into a gap of a few texels, surfaces nearer than that are not in view.
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::BakeError;
-use crate::chunks::{in_chunks, in_chunks_uncheckpointed};
+use crate::chunks::{decide, in_chunks_uncheckpointed};
+use crate::color::channel_mean;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Texel, open_texels, receiver};
 use crate::coverage::texel_groups::TexelGroups;
@@ -85,10 +85,9 @@ impl LocalLight {
             covered[texel.index.place()] = place.0;
         }
         let walker = Walker { sources, layout, covered, blocks: &blocks, direct };
-        // Stored in the checkpoint as a list of one value, so that a bake which resumes there measures errors by the
-        // same light.
+        // Kept in the checkpoint, so that a bake which resumes there measures errors by the same light.
         let clock = monitor.clock();
-        let is_late = in_chunks(1, monitor, |_| clock.is_over())?.contains(&true);
+        let is_late = decide(monitor, clock.is_over())?;
         let walks: Vec<Vec<Walk>> = in_chunks_uncheckpointed(blocks.members.len(), monitor, |block| {
             let members = &blocks.members[block];
             let walks = match is_late {
@@ -205,8 +204,4 @@ impl Walker<'_> {
         let texel = self.layout.texel_at(&self.sources.scene.triangles[triangle as usize], at)?;
         Some(self.covered[texel.place()]).filter(|place| *place != u32::MAX)
     }
-}
-
-fn channel_mean(light: Vec3) -> f32 {
-    light.element_sum() / 3.0
 }
