@@ -31,7 +31,7 @@ pub(crate) fn steep_texels(texels: &CoveredTexels<'_>, direct: &[Vec3], local: &
         let (least, most) =
             around.fold((f32::INFINITY, 0.0f32), |(least, most), light| (least.min(light), most.max(light)));
         steep[texel.index.place()] =
-            most - least > STEEP * most && f64::from(most) > MIN_LIGHT * local.at(covered.place());
+            most - least > STEEP * most && f64::from(most) > MIN_LIGHT * local.at(covered);
     }
     steep
 }
