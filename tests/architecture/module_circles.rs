@@ -1,6 +1,6 @@
-//! Checks that the modules of a crate import each other downwards only. The imports are read from the sources,
-//! including re-exports at the crate's root. Dependencies between crates, and between the files within a module,
-//! are not checked here.
+//! Checks that the modules of a crate import each other downwards only, and the stages of a bake only those before
+//! them. The imports are read from the sources, including re-exports at the crate's root. Dependencies between crates,
+//! and between the files within a module, are not checked here.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -228,4 +228,67 @@ fn a_circle_is_seen_and_a_test_may_look_upwards() {
     for harmless in ["#[cfg(test)] mod tests { use crate::Tall; }", "#[cfg(test)] use crate::high::Tall;"] {
         assert_eq!(found(harmless), Vec::<String>::new(), "{harmless}");
     }
+}
+
+/// Returns the folders that the bold headings of a page name, in order: "**It arrives: `direct_light/`.** …".
+fn folders_of_headings(page: &str) -> Vec<&str> {
+    let headings = page.lines().filter_map(|line| line.strip_prefix("**")?.split_once("**"));
+    headings.flat_map(|(heading, _)| heading.split('`')).filter_map(|code| code.strip_suffix('/')).collect()
+}
+
+/// Returns descriptions of the imports by which a module depends on one that comes later in an order. Modules that the
+/// order does not name may be imported by all.
+fn imports_of_later(order: &[&str], imports: &Imports) -> Vec<String> {
+    let mut found = Vec::new();
+    for (place, module) in order.iter().enumerate() {
+        for (other, file) in imports.get(*module).into_iter().flatten() {
+            if order[place..].contains(&other.as_str()) {
+                found.push(format!("{module} imports {other} (in {file}), which comes later"));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn stages_of_a_bake_import_only_those_before_them() {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let page = std::fs::read_to_string(root.join("docs/baking.md")).expect("the page on baking exists");
+    let order = folders_of_headings(&page);
+    let folder = root.join("crates/lumbre_bake/src");
+    let mut folders: Vec<String> = std::fs::read_dir(&folder)
+        .expect("the baker has sources")
+        .map(|entry| entry.expect("an entry of a folder can be read"))
+        .filter(|entry| entry.path().is_dir())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    folders.sort_unstable();
+    let mut named = order.clone();
+    named.sort_unstable();
+    assert_eq!(named, folders, "the page names every folder once");
+    let mut sources = Sources::new();
+    sources_below(&folder, "", &mut sources);
+    let imports = imports(&sources).expect("the sources can be parsed");
+    let later = imports_of_later(&order, &imports);
+    assert!(later.is_empty(), "{}", later.join("\n"));
+    // Control: in the reverse order nearly every import is of a later folder.
+    let reversed: Vec<&str> = order.iter().rev().copied().collect();
+    assert!(imports_of_later(&reversed, &imports).len() > order.len());
+}
+
+#[test]
+fn an_import_of_a_later_stage_is_seen() {
+    let page =
+        "**First: `low/`.** Text with `other/` in it.\n\n**Then: `high/`, `top/`.** More.\n**No folder.**\n";
+    let order = folders_of_headings(page);
+    assert_eq!(order, ["low", "high", "top"]);
+    let file = |path: &str, text: &str| (path.to_owned(), text.to_owned());
+    let found = |low: &str| {
+        let root = file("lib", "mod high; mod low; mod top;");
+        let sources =
+            vec![root, file("low", low), file("high", "use crate::low::Short;"), file("top/mod", "")];
+        imports_of_later(&order, &imports(&sources).expect("these can be parsed"))
+    };
+    assert_eq!(found("pub struct Short;"), Vec::<String>::new());
+    assert_eq!(found("use crate::top::Tall;"), ["low imports top (in low), which comes later"]);
 }

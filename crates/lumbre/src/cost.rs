@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use anyhow::{Context, bail};
-use lumbre::bake::Progress;
 use lumbre::cost::{
     CostError, CostOptions, CostReport, PAGE, compare_reports, measure, read_report, studies_named,
 };
@@ -14,7 +13,7 @@ use lumbre::render::Gpu;
 
 use crate::arguments::Cost;
 use crate::interruption::Interruption;
-use crate::progress::Shown;
+use crate::progress::{Progress, Shown};
 
 /// Default width and height of the pictures: normally, and with `--quick`.
 const SIZES: [(u32, u32); 2] = [(480, 270), (240, 135)];

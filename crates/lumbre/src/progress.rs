@@ -4,10 +4,34 @@ use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use lumbre::bake::Progress;
+use lumbre::bake;
 
 /// Time between two lines.
 const EVERY: Duration = Duration::from_secs(10);
+
+/// How far a long operation is: a bake, a picture, a measurement.
+#[derive(Clone, Copy)]
+pub struct Progress {
+    /// Name of the running stage.
+    pub stage: &'static str,
+    /// Completed fraction of this stage, in [0, 1].
+    pub stage_fraction: f32,
+    /// Completed fraction of the whole, in [0, 1].
+    pub fraction: f32,
+    /// Estimated relative error of the result so far, if there is an estimate.
+    pub error: Option<f64>,
+}
+
+impl From<bake::Progress> for Progress {
+    fn from(bake: bake::Progress) -> Self {
+        Self {
+            stage: bake.stage,
+            stage_fraction: bake.stage_fraction,
+            fraction: bake.fraction,
+            error: bake.error,
+        }
+    }
+}
 
 /// The form in which progress is shown on standard error.
 pub enum Shown {
@@ -33,7 +57,8 @@ impl Shown {
     }
 
     /// Shows the current progress.
-    pub fn update(&mut self, progress: Progress) {
+    pub fn update(&mut self, progress: impl Into<Progress>) {
+        let progress = progress.into();
         match self {
             Self::Nothing => {}
             Self::Bar(bar) => {

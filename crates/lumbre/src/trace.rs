@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use glam::DVec2;
-use lumbre::bake::Progress;
 use lumbre::demo::has_light_to_bake;
 use lumbre::render::Display;
 use lumbre::trace::{
@@ -21,7 +20,7 @@ use crate::interruption::Interruption;
 use crate::kept_samples::KeptSamples;
 use crate::loading::{extension, frame_options, load};
 use crate::picture_files::{Development, write_open_exr, write_png};
-use crate::progress::Shown;
+use crate::progress::{Progress, Shown};
 
 /// Fraction of a picture that has to be clipped to white before an exposure is metered without being asked
 /// for; the same as for frames.

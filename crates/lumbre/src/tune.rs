@@ -7,14 +7,13 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use anyhow::bail;
-use lumbre::bake::Progress;
 use lumbre::cost::{CostError, DrawSettings, Goal, PAGE, TuneOptions, Tuned, tune};
 use lumbre::render::Gpu;
 use lumbre::scene::{FileSettings, save_settings};
 
 use crate::arguments::Tune;
 use crate::interruption::Interruption;
-use crate::progress::Shown;
+use crate::progress::{Progress, Shown};
 
 /// Default width and height of the frames: normally, and with `--quick`.
 const SIZES: [(u32, u32); 2] = [(1280, 720), (480, 270)];

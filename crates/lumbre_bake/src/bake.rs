@@ -8,6 +8,7 @@ use bevy_ecs::world::World;
 use lumbre_scene::{IrradianceVolume, Transform};
 
 use crate::apply::apply;
+use crate::baked_scene::BakedScene;
 use crate::checkpoint::CheckpointFile;
 use crate::chunks::decide;
 use crate::content_hash::hashes_of;
@@ -16,17 +17,18 @@ use crate::direct_light::{SHORT_OF_TIME, direct_light};
 use crate::final_gather::lit_texels::LitTexels;
 use crate::final_gather::radiance_cache::RadianceCache;
 use crate::final_gather::rounds::{self, IndirectLight};
-use crate::finish::baked_scene::{BakedMap, BakedObject, BakedScene};
+use crate::finish::baked_maps::{BakedMap, BakedObject};
 use crate::finish::finished_maps::finished_maps;
 use crate::finish::resolution_error::dense_points;
 use crate::memory;
-use crate::monitor::{BakeMonitor, Callback, Stage};
+use crate::monitor::{BakeMonitor, Callback};
 use crate::probes;
 use crate::radiosity::exchange::Exchange;
 use crate::radiosity::patch_light::patch_light;
 use crate::radiosity::patches::Patches;
 use crate::rebake::{Reuse, Samples, rebake_report, reused_gather};
 use crate::scene::{StaticScene, from_world};
+use crate::stage::Stage;
 use crate::summary;
 use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, Progress, prepare};
 

@@ -44,6 +44,7 @@
 
 mod apply;
 mod bake;
+mod baked_scene;
 mod cancel_token;
 mod checkpoint;
 mod chunks;
@@ -71,17 +72,19 @@ mod sampling;
 mod scene;
 mod sources;
 mod squared_errors;
+mod stage;
 mod summary;
 mod texel_index;
 mod unwrapped_from;
 mod visibility;
 
 pub use bake::Bake;
+pub use baked_scene::BakedScene;
 pub use cancel_token::CancelToken;
 pub use checkpoint::Checkpoint;
 pub use content_hash::{ContentHash, content_hash};
 pub use error::{BakeError, CheckpointError};
-pub use finish::baked_scene::{BakedMap, BakedObject, BakedScene, TexelErrors};
+pub use finish::baked_maps::{BakedMap, BakedObject, TexelErrors};
 pub use light_to_bake::has_light_to_bake;
 pub use monitor::Progress;
 pub use options::{BakeOptions, Density, FormFactorMethod, Probes, Quality, Solver};

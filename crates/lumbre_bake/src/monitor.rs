@@ -1,5 +1,6 @@
 //! Supervises a running bake: reports progress to the caller, measures stages, keeps the time limit, handles
-//! cancellation, and passes finished chunks to the checkpoint. How a list is divided into chunks is in `chunks`.
+//! cancellation, and passes finished chunks to the checkpoint. The stages and their shares of the
+//! time are in `stage`; how a list is divided into chunks is in `chunks`.
 
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -8,10 +9,12 @@ use std::time::{Duration, Instant};
 use crate::cancel_token::CancelToken;
 use crate::checkpoint::checkpoint_file::ChunkKey;
 use crate::checkpoint::{CheckpointFile, Record};
+use crate::stage::Stage;
 use crate::{BakeError, BakeReport, StageTime};
 
 /// The progress of a running bake, as passed to the callback of [`Bake::progress`](crate::Bake::progress).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Progress {
     /// Name of the running stage, as in [`StageTime::stage`].
     pub stage: &'static str,
@@ -31,62 +34,6 @@ const MAX_PASS_END: f32 = 0.999;
 
 /// Interval between calls of the progress callback during long work.
 const CALLBACK_INTERVAL: Duration = Duration::from_millis(50);
-
-/// The stages, in order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Stage {
-    Layout,
-    Hierarchy,
-    DirectLight,
-    FormFactors,
-    Radiosity,
-    FinalGather,
-    Probes,
-    Resolution,
-    Texels,
-    Seams,
-}
-
-/// A stage's name and its part in the time of a bake.
-struct StageShare {
-    name: &'static str,
-    /// Its usual share of the bake's time.
-    of_time: f32,
-    /// The share of the time limit after which this stage takes no more samples, so that time is left for a rough
-    /// result of later stages.
-    of_limit: f64,
-}
-
-impl Stage {
-    const ALL: [Self; 10] = [
-        Self::Layout,
-        Self::Hierarchy,
-        Self::DirectLight,
-        Self::FormFactors,
-        Self::Radiosity,
-        Self::FinalGather,
-        Self::Probes,
-        Self::Resolution,
-        Self::Texels,
-        Self::Seams,
-    ];
-
-    fn share(self) -> StageShare {
-        let (name, of_time, of_limit) = match self {
-            Self::Layout => ("layout", 0.03, 1.0),
-            Self::Hierarchy => ("hierarchy", 0.02, 1.0),
-            Self::DirectLight => ("direct light", 0.2, 0.38),
-            Self::FormFactors => ("form factors", 0.1, 0.52),
-            Self::Radiosity => ("radiosity", 0.05, 0.52),
-            Self::FinalGather => ("final gather", 0.48, 0.93),
-            Self::Probes => ("probes", 0.05, 0.95),
-            Self::Resolution => ("resolution", 0.02, 0.97),
-            Self::Texels => ("texels", 0.03, 1.0),
-            Self::Seams => ("seams", 0.02, 1.0),
-        };
-        StageShare { name, of_time, of_limit }
-    }
-}
 
 /// The time that a bake has taken, and its limit.
 #[derive(Clone, Copy, Debug)]
@@ -188,7 +135,7 @@ impl<'a> BakeMonitor<'a> {
 
     /// A clock whose limit is the running stage's share of the time limit. It can be copied to other threads.
     pub fn clock(&self) -> Clock {
-        self.clock.until(self.running().share().of_limit)
+        self.clock.until(self.running().share_of_limit())
     }
 
     /// Seconds that the bake has taken, including those of interrupted bakes that it resumes.
@@ -218,10 +165,9 @@ impl<'a> BakeMonitor<'a> {
     /// Writes the time of the running stage into the report.
     pub fn end_stage(&mut self, report: &mut BakeReport) {
         if let Some((stage, begun)) = self.stage.take() {
-            report.stages.push(StageTime {
-                stage: stage.share().name.to_owned(),
-                seconds: begun.elapsed().as_secs_f64(),
-            });
+            report
+                .stages
+                .push(StageTime { stage: stage.name().to_owned(), seconds: begun.elapsed().as_secs_f64() });
         }
     }
 
@@ -316,18 +262,15 @@ impl<'a> BakeMonitor<'a> {
 
     fn cancelled<T>(&mut self) -> Result<T, BakeError> {
         self.checkpoint.flush();
-        Err(BakeError::Cancelled { stage: self.running().share().name })
+        Err(BakeError::Cancelled { stage: self.running().name() })
     }
 
     fn progress(&self, stage_fraction: f32) -> Progress {
         let stage = self.running();
-        let StageShare { name, of_time, .. } = stage.share();
-        let earlier_stages: f32 =
-            Stage::ALL.iter().take_while(|other| **other != stage).map(|other| other.share().of_time).sum();
         let (begin, end) = self.pass;
         let stage_fraction = begin + (end - begin) * stage_fraction.clamp(0.0, 1.0);
-        let fraction = (earlier_stages + of_time * stage_fraction).min(1.0);
-        Progress { stage: name, stage_fraction, fraction, error: self.error }
+        let fraction = stage.share_of_bake_before() + stage.share_of_bake() * stage_fraction;
+        Progress { stage: stage.name(), stage_fraction, fraction: fraction.min(1.0), error: self.error }
     }
 
     fn check_cancelled(&mut self) -> Result<(), BakeError> {

@@ -21,6 +21,7 @@ pub enum Density {
 
 /// Whether irradiance probes are baked, which light moving objects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Probes {
     /// If the scene contains dynamic objects.
     #[default]
@@ -34,6 +35,7 @@ pub enum Probes {
 /// The effort of a bake: the number of patches and form factor rays, and the most samples that it takes to reach
 /// [`BakeOptions::error`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Quality {
     /// For previews while a level is being built: few patches and few rays.
     Draft,
@@ -47,6 +49,7 @@ pub enum Quality {
 
 /// How form factors are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum FormFactorMethod {
     /// Cosine-distributed rays from points on every patch: F_ij is the fraction of patch i's rays that hit j first.
     #[default]
@@ -60,6 +63,7 @@ pub enum FormFactorMethod {
 /// The iterative method that solves the radiosity system. All reach the same solution, in different numbers of
 /// iterations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Solver {
     /// B ← E + ρ F B: each iteration adds one bounce.
     Jacobi,

@@ -10,6 +10,7 @@ use crate::final_gather::map_error::MapError;
 use crate::finish::worst_places::worst_places;
 use crate::monitor::BakeMonitor;
 use crate::scene::SceneObject;
+use crate::stage::Stage;
 use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 
 /// Ends the last stage and writes the times and the checkpoint's warnings.
@@ -24,15 +25,10 @@ pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> B
     }
     report.resumed_seconds = monitor.checkpoint.resumed;
     report.warnings.append(&mut monitor.checkpoint.warnings);
-    let casting: f64 = report
-        .stages
-        .iter()
-        .filter(|stage| {
-            ["direct light", "form factors", "final gather", "probes", "resolution"]
-                .contains(&stage.stage.as_str())
-        })
-        .map(|stage| stage.seconds)
-        .sum();
+    let casting: Vec<&str> =
+        Stage::ALL.into_iter().filter(|stage| stage.casts_rays()).map(Stage::name).collect();
+    let casting = report.stages.iter().filter(|stage| casting.contains(&stage.stage.as_str()));
+    let casting: f64 = casting.map(|stage| stage.seconds).sum();
     report.mega_rays_per_second = if casting > 0.0 { report.rays as f64 * 1e-6 / casting } else { 0.0 };
     report
 }

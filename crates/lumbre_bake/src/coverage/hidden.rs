@@ -17,7 +17,7 @@ use crate::chunks::in_chunks;
 use crate::monitor::{BakeMonitor, Clock};
 use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
-use crate::texel_index::MapTexel;
+use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::visibility::shaft::is_free_before;
 
 /// The seed of all rays here, independent of the bake's seed.
@@ -110,8 +110,8 @@ fn suspicious_texels(
     let mut is_crossed = vec![false; layout.texels];
     contacts.iter().for_each(|(texel, _)| is_crossed[texel.place()] = true);
     let suspicious_tiles = monitor.run_interruptible(0.0, || {
-        let check = |members: &Vec<u32>| {
-            let members: Vec<&Texel> = members.iter().map(|&place| &texels[place as usize]).collect();
+        let check = |members: &Vec<CoveredTexel>| {
+            let members: Vec<&Texel> = members.iter().map(|member| &texels[member.place()]).collect();
             suspicious_tile(scene, &members, &is_crossed)
         };
         tiles.members.par_iter().map(check).collect::<Vec<(bool, u32)>>()

@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 
 use super::footprint::Texel;
+use crate::texel_index::CoveredTexel;
 
 /// Texels along a tile's side.
 const TILE_SIDE: u32 = 8;
@@ -13,8 +14,8 @@ type Key = [u32; 4];
 
 /// Covered texels divided into groups, which are numbered in the order in which the texels first name them.
 pub(crate) struct TexelGroups {
-    /// The members of each group, as indices into the list of texels.
-    pub members: Vec<Vec<u32>>,
+    /// The members of each group.
+    pub members: Vec<Vec<CoveredTexel>>,
     /// The group of each texel.
     pub group_of: Vec<u32>,
 }
@@ -41,7 +42,7 @@ impl TexelGroups {
         let mut groups = Self { members: Vec::new(), group_of: Vec::with_capacity(texels.len()) };
         // Texels come row by row, so that most are in the group of the one before: this saves the look-up.
         let mut previous: Option<(Key, u32)> = None;
-        for (index, texel) in texels.iter().enumerate() {
+        for (index, texel) in CoveredTexel::all(texels.len()).zip(texels) {
             let key = key(texel);
             let group = match previous {
                 Some((previous_key, group)) if previous_key == key => group,
@@ -53,7 +54,7 @@ impl TexelGroups {
             previous = Some((key, group));
             groups.group_of.push(group);
             if is_member(texel) {
-                groups.members[group as usize].push(index as u32);
+                groups.members[group as usize].push(index);
             }
         }
         groups

@@ -10,6 +10,7 @@ use crate::coverage::texel_groups::TexelGroups;
 use crate::scene::Receiver;
 use crate::sources::light_cut::LightCut;
 use crate::sources::light_sources::Sources;
+use crate::texel_index::CoveredTexel;
 
 /// Texels along a block's side.
 const BLOCK: u32 = 16;
@@ -27,16 +28,16 @@ impl LightCuts {
     /// Cuts of all blocks; `charts` holds the chart of each triangle.
     pub fn new(sources: &Sources<'_>, texels: &[Texel], charts: &[u32]) -> Self {
         let blocks = TexelGroups::blocks(texels, charts, BLOCK);
-        let anchor = |members: &Vec<u32>| {
-            let middle_of = |&member: &u32| -> Option<Receiver> {
-                let texel = &texels[member as usize];
+        let anchor = |members: &Vec<CoveredTexel>| {
+            let middle_of = |member: &CoveredTexel| -> Option<Receiver> {
+                let texel = &texels[member.place()];
                 Some(receiver(sources.scene, &texel.point(sources.scene, 0.5, 0.5)?))
             };
             let anchor = members.get(members.len() / 2).and_then(middle_of)?;
             let distance = |other: Receiver| other.position.distance(anchor.position);
             let farthest = members.iter().filter_map(middle_of).map(distance).fold(0.0, f32::max);
             // The middles do not reach to the edges of the block: add a texel.
-            let side = texels[members[0] as usize].side(sources.scene);
+            let side = texels[members[0].place()].side(sources.scene);
             Some((anchor, farthest + if side.is_finite() { side } else { 0.0 }))
         };
         let anchors: Vec<Option<(Receiver, f32)>> = blocks.members.par_iter().map(anchor).collect();
@@ -47,11 +48,11 @@ impl LightCuts {
         Self { cuts, anchors, blocks }
     }
 
-    /// Makes lamps share samples: each pair is the index of a texel, which stands for its whole block, and the lamp
+    /// Makes lamps share samples: each pair is a texel, which stands for its whole block, and the lamp
     /// that shares samples there.
-    pub fn share(&mut self, sources: &Sources<'_>, lamps: &[(u32, u32)]) {
+    pub fn share(&mut self, sources: &Sources<'_>, lamps: &[(CoveredTexel, u32)]) {
         let mut lamps_by_block: Vec<(u32, u32)> =
-            lamps.iter().map(|&(texel, lamp)| (self.blocks.group_of[texel as usize], lamp)).collect();
+            lamps.iter().map(|&(texel, lamp)| (self.block(texel), lamp)).collect();
         lamps_by_block.sort_unstable();
         lamps_by_block.dedup();
         let groups: Vec<&[(u32, u32)]> = lamps_by_block.chunk_by(|a, b| a.0 == b.0).collect();
@@ -68,13 +69,13 @@ impl LightCuts {
     }
 
     /// The cut of a covered texel.
-    pub fn of(&self, place: usize) -> &LightCut {
-        &self.cuts[self.blocks.group_of[place] as usize]
+    pub fn of(&self, texel: CoveredTexel) -> &LightCut {
+        &self.cuts[self.block(texel) as usize]
     }
 
     /// The number of a covered texel's block.
-    pub fn block(&self, place: usize) -> u32 {
-        self.blocks.group_of[place]
+    pub fn block(&self, texel: CoveredTexel) -> u32 {
+        self.blocks.group_of[texel.place()]
     }
 
     /// Whether any texel has sources that share samples.

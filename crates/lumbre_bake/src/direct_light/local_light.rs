@@ -6,11 +6,11 @@
 //! the mean. The result is not an exact solution: it comes from a few random walks through the scene, which read direct
 //! light where they hit. As no eye fits into a gap of a few texels, surfaces nearer than that are not in view.
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::BakeError;
-use crate::chunks::{in_chunks, in_chunks_uncheckpointed};
+use crate::chunks::{decide, in_chunks_uncheckpointed};
+use crate::color::channel_mean;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Texel, open_texels, receiver};
 use crate::coverage::texel_groups::TexelGroups;
@@ -22,6 +22,7 @@ use crate::scene::{LightmapLayout, SurfaceHit};
 use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
 use crate::squared_errors::SquaredErrors;
+use crate::texel_index::CoveredTexel;
 
 /// Texels along the side of a block, all of which have the same local light.
 const BLOCK: u32 = 16;
@@ -61,8 +62,8 @@ struct Walk {
 struct Walker<'a> {
     sources: &'a Sources<'a>,
     layout: &'a LightmapLayout,
-    /// For each texel of all maps, its index among the covered ones; `u32::MAX` if it is not covered, or hidden.
-    covered: Vec<u32>,
+    /// For each texel of all maps, its index among the covered ones; `None` if it is not covered, or hidden.
+    covered: Vec<Option<CoveredTexel>>,
     blocks: &'a TexelGroups,
     direct: &'a [Direct],
 }
@@ -80,15 +81,14 @@ impl LocalLight {
     ) -> Result<Self, BakeError> {
         let CoveredTexels { layout, list: texels, charts, .. } = texels;
         let blocks = TexelGroups::blocks(texels, charts, BLOCK);
-        let mut covered = vec![u32::MAX; layout.texels];
+        let mut covered = vec![None; layout.texels];
         for (place, texel) in open_texels(texels) {
-            covered[texel.index.place()] = place.0;
+            covered[texel.index.place()] = Some(place);
         }
         let walker = Walker { sources, layout, covered, blocks: &blocks, direct };
-        // Stored in the checkpoint as a list of one value, so that a bake which resumes there measures errors by the
-        // same light.
+        // Kept in the checkpoint, so that a bake which resumes there measures errors by the same light.
         let clock = monitor.clock();
-        let is_late = in_chunks(1, monitor, |_| clock.is_over())?.contains(&true);
+        let is_late = decide(monitor, clock.is_over())?;
         let walks: Vec<Vec<Walk>> = in_chunks_uncheckpointed(blocks.members.len(), monitor, |block| {
             let members = &blocks.members[block];
             let walks = match is_late {
@@ -98,7 +98,7 @@ impl LocalLight {
             };
             (0..walks).map(|walk| walker.walk(texels, members, block as u32, walk)).collect()
         })?;
-        let mean_of = |members: &Vec<u32>, of: &dyn Fn(u32) -> f32| {
+        let mean_of = |members: &Vec<CoveredTexel>, of: &dyn Fn(CoveredTexel) -> f32| {
             members.iter().map(|&member| f64::from(of(member))).sum::<f64>() / members.len().max(1) as f64
         };
         let block_light: Vec<f64> = blocks
@@ -106,7 +106,7 @@ impl LocalLight {
             .par_iter()
             .zip(&walks)
             .map(|(members, walks)| {
-                let direct = mean_of(members, &|member| channel_mean(direct[member as usize].baked));
+                let direct = mean_of(members, &|member| channel_mean(direct[member.place()].baked));
                 let indirect = walks.iter().map(|walk| f64::from(walk.indirect)).sum::<f64>();
                 direct + indirect / walks.len().max(1) as f64
             })
@@ -143,8 +143,8 @@ impl LocalLight {
 
 impl LocalLight {
     /// The local light of a covered texel, W/m²; positive.
-    pub fn at(&self, place: usize) -> f64 {
-        f64::from(self.irradiance[place])
+    pub fn at(&self, texel: CoveredTexel) -> f64 {
+        f64::from(self.irradiance[texel.place()])
     }
 
     /// Squared errors relative to the squared local light of their texels.
@@ -160,13 +160,13 @@ impl LocalLight {
 
 impl Walker<'_> {
     /// Walk `number` from a random point of a block.
-    fn walk(&self, texels: &[Texel], members: &[u32], block: u32, number: u32) -> Walk {
+    fn walk(&self, texels: &[Texel], members: &[CoveredTexel], block: u32, number: u32) -> Walk {
         let scene = self.sources.scene;
         let sequence = Sequence::new(SEED, Stream::LocalLight, block);
         let mut walk = Walk::default();
         let [choice, x, y, _] = sequence.point(number, 0);
         let member = members[((choice * members.len() as f32) as usize).min(members.len() - 1)];
-        let texel = &texels[member as usize];
+        let texel = &texels[member.place()];
         let Some(point) = texel.point(scene, x, y) else { return walk };
         let mut at: Receiver = receiver(scene, &point);
         let side = texel.side(scene);
@@ -189,10 +189,10 @@ impl Walker<'_> {
             let place = (side == Side::Front).then(|| self.covered_texel_at(triangle, (u, v))).flatten();
             if let Some(place) = place {
                 if seen < VIEW && distance >= nearest {
-                    walk.in_view[seen] = Some(self.blocks.group_of[place as usize]);
+                    walk.in_view[seen] = Some(self.blocks.group_of[place.place()]);
                     seen += 1;
                 }
-                walk.indirect += weight * channel_mean(self.direct[place as usize].total());
+                walk.indirect += weight * channel_mean(self.direct[place.place()].total());
             }
             at = Receiver::on_facet(scene, triangle, side, (u, v));
         }
@@ -201,12 +201,8 @@ impl Walker<'_> {
     }
 
     /// The index of the covered texel at a point on a triangle's front.
-    fn covered_texel_at(&self, triangle: u32, at: (f32, f32)) -> Option<u32> {
+    fn covered_texel_at(&self, triangle: u32, at: (f32, f32)) -> Option<CoveredTexel> {
         let texel = self.layout.texel_at(&self.sources.scene.triangles[triangle as usize], at)?;
-        Some(self.covered[texel.place()]).filter(|place| *place != u32::MAX)
+        self.covered[texel.place()]
     }
-}
-
-fn channel_mean(light: Vec3) -> f32 {
-    light.element_sum() / 3.0
 }

@@ -157,7 +157,7 @@ impl<'a> SourceSampler<'a> {
         let sequence = Sequence::new(self.options.seed, Stream::DirectLight, texel.index.0);
         let scene = self.sources.scene;
         self.sources.irradiance_per_source(
-            self.cuts.of(covered.place()),
+            self.cuts.of(covered),
             &self.shafts.visibility(covered.place(), texel),
             sequence,
             samples,
@@ -212,10 +212,10 @@ impl<'a> SourceSampler<'a> {
             let mut balance: HashMap<u32, i64> = HashMap::new();
             for texel in self.unknown().filter(|texel| !self.texels.list[texel.place()].is_hidden()) {
                 let change = if direct[texel.place()].seen.partly { -1 } else { 1 };
-                *balance.entry(self.cuts.block(texel.place())).or_default() += change;
+                *balance.entry(self.cuts.block(texel)).or_default() += change;
             }
             lamps.retain(|(texel, _)| {
-                balance.get(&self.cuts.block(*texel as usize)).is_some_and(|balance| *balance < 0)
+                balance.get(&self.cuts.block(*texel)).is_some_and(|balance| *balance < 0)
             });
             self.cuts.share(self.sources, &lamps);
             lamps
@@ -223,9 +223,9 @@ impl<'a> SourceSampler<'a> {
         if lamps.is_empty() {
             return Ok(());
         }
-        let blocks: BTreeSet<u32> = lamps.iter().map(|(texel, _)| self.cuts.block(*texel as usize)).collect();
+        let blocks: BTreeSet<u32> = lamps.iter().map(|(texel, _)| self.cuts.block(*texel)).collect();
         let changed: Vec<CoveredTexel> =
-            self.unknown().filter(|texel| blocks.contains(&self.cuts.block(texel.place()))).collect();
+            self.unknown().filter(|texel| blocks.contains(&self.cuts.block(*texel))).collect();
         let [few, ..] = self.options.effort().direct;
         for (texel, light) in changed.iter().zip(self.few_samples(&changed, few, monitor)?) {
             // What was seen before tells the neighbours that a penumbra is near.

@@ -28,7 +28,7 @@ struct TileOccluders {
     lights: Vec<(u32, LightVisibility)>,
     /// The index of a texel of the tile that is in the open; `None` if there is none, or if no texel of the tile is
     /// wanted.
-    open_texel: Option<u32>,
+    open_texel: Option<CoveredTexel>,
 }
 
 /// What may occlude a lamp, a node of the emitter tree, from a tile.
@@ -65,12 +65,12 @@ impl<'a> Shafts<'a> {
         shafts.tiles = members
             .par_iter()
             .map(|members| {
-                if scene.stop.is_cancelled() || !members.iter().any(|&texel| wanted(CoveredTexel(texel))) {
+                if scene.stop.is_cancelled() || !members.iter().any(|&texel| wanted(texel)) {
                     return TileOccluders::default();
                 }
-                let cut = cuts.of(members[0] as usize);
-                let open_texel = members.iter().copied().find(|&texel| !texels[texel as usize].is_hidden());
-                let members = || members.iter().map(|&texel| &texels[texel as usize]);
+                let cut = cuts.of(members[0]);
+                let open_texel = members.iter().copied().find(|&texel| !texels[texel.place()].is_hidden());
+                let members = || members.iter().map(|&texel| &texels[texel.place()]);
                 let occluders = shafts.tile_occluders(cut, members).unwrap_or_default();
                 TileOccluders { open_texel, ..occluders }
             })
@@ -126,22 +126,22 @@ impl<'a> Shafts<'a> {
         &self,
         cuts: &LightCuts,
         accepts_block: impl Fn(u32, &LightCut) -> bool,
-    ) -> Vec<(u32, u32)> {
+    ) -> Vec<(CoveredTexel, u32)> {
         // The number of tiles in each block; and for each block and lamp a texel and the number of tiles that do not
         // know the lamp's occluders.
         let mut tiles: BTreeMap<u32, u32> = BTreeMap::new();
-        let mut unresolved: BTreeMap<(u32, u32), (u32, u32)> = BTreeMap::new();
+        let mut unresolved: BTreeMap<(u32, u32), (CoveredTexel, u32)> = BTreeMap::new();
         for (tile, texel) in self.tiles.iter().filter_map(|tile| Some((tile, tile.open_texel?))) {
-            let block = cuts.block(texel as usize);
+            let block = cuts.block(texel);
             *tiles.entry(block).or_default() += 1;
-            let cut = cuts.of(texel as usize);
+            let cut = cuts.of(texel);
             for &lamp in cut.lamps.iter().filter(|_| accepts_block(block, cut)) {
                 if tile.lamps.iter().all(|occluders| occluders.node != lamp) {
                     unresolved.entry((block, lamp)).or_insert((texel, 0)).1 += 1;
                 }
             }
         }
-        let in_most_tiles = |((block, lamp), (texel, count)): ((u32, u32), (u32, u32))| {
+        let in_most_tiles = |((block, lamp), (texel, count)): ((u32, u32), (CoveredTexel, u32))| {
             (2 * count > tiles[&block]).then_some((texel, lamp))
         };
         unresolved.into_iter().filter_map(in_most_tiles).collect()

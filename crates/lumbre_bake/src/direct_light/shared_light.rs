@@ -162,7 +162,7 @@ impl<'a> SharedLight<'a> {
 
     /// Adds samples to the sums of a texel until each replicate has `samples`.
     fn add(&self, place: usize, sums: &mut SampleSums, samples: u32) {
-        let (texel, shared) = (&self.texels[place], &self.cuts.of(place).shared);
+        let (texel, shared) = (&self.texels[place], &self.cuts.of(CoveredTexel::new(place)).shared);
         if !texel.is_hidden() && !shared.is_empty() {
             sums.add(
                 self.sources,

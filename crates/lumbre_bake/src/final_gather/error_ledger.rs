@@ -22,9 +22,31 @@
 //!                  are rounded
 //! ```
 //!
-//! The finished map states two more errors texel by texel, which no round can reduce and which the whole map's figure
-//! does not contain: `finish::fill` moves values along their neighbours' slope to the texels' centres, which changes
-//! their error, and `finish::seams` adds by how much a texel was moved.
+//! Where the constants of each term are, what they were measured on or follow from, and the tests of the term itself.
+//! `honest_error` and `coverage` test the sum of all terms:
+//!
+//! ```text
+//!   term           constants                                  measured on                   tests
+//!   ─────────────  ─────────────────────────────────────────  ────────────────────────────  ───────────────────────────
+//!   direct light   VARIANCE_FACTOR: sources::batches          not recorded                  of sources::share_variance
+//!                  EDGE: sources::share_variance              derived: strata on an edge
+//!   noise          CAUTION: denoise::replicates               two rooms, four seeds         none by itself
+//!                  RELATIVE_VARIANCE: the same                derived: four replicates
+//!   smoothing      BLOCK_RADIUS, BIAS_RADIUS:                 not recorded                  none by itself
+//!                  denoise::smoothing_bias
+//!   form factors   ORDER: radiosity::size_error               rooms                         of radiosity::exchange
+//!   texels read    none
+//!   patches        CHECK_RADIUS, SIGNIFICANT, WIDER_STEPS,    not recorded                  of error_estimate
+//!                  WIDER_STEP: error_estimate
+//!   solver         none                                                                     of radiosity::exchange
+//!   reused gather  MAX_SHARE, MAX_TEXEL_SHARE: rebake::choice chosen, not measured          `rebake`
+//!   arithmetic     ARITHMETIC: here                           derived: roundings            none by itself
+//! ```
+//!
+//! Two later steps rewrite the errors of single texels in the finished map. They are not terms: no round can reduce
+//! them, and the whole map's figure does not contain them. `finish::fill` moves values along their neighbours' slope to
+//! the texels' centres, which changes their variance with the weights of the fit; `finish::seams` adds the square of by
+//! how much a texel was moved.
 //!
 //! A cautious figure is stated for a single texel, the expected one for the whole map: the cautious figures of many
 //! texels add up to far more than the map's error. The tests `honest_error` compare both with converged bakes, and

@@ -4,6 +4,7 @@
 //! so near a hit, the path makes another bounce instead. Emission is not read: `direct_light` has already counted it.
 //! Not where rays go and what they hit: that is `incident`.
 
+use crate::color::channel_mean;
 use crate::denoise::nearness::Nearness;
 use crate::denoise::replicates::REPLICATES;
 use crate::final_gather::gather_sums::{GatherSums, UnguidedLight};
@@ -243,8 +244,8 @@ impl RadianceCache<'_> {
             gathered.texel_reads += u32::from(contribution.reads_texel);
             gathered.checks += u32::from(contribution.is_checked);
             gathered.differences += contribution.difference;
-            gathered.squared_differences += (contribution.difference.element_sum() / 3.0).powi(2);
-            let light = contribution.light.element_sum() / 3.0;
+            gathered.squared_differences += channel_mean(contribution.difference).powi(2);
+            let light = channel_mean(contribution.light);
             if let Some(hit) = &samples.results[slot].hit
                 && light > gathered.unguided.light
                 && samples.paths[slot].cosine_share() * contribution.weight > UNGUIDED
@@ -295,7 +296,7 @@ impl RadianceCache<'_> {
             last = hit;
         }
         contribution.light = light + weight * last.indirect;
-        let mean_weight = weight.element_sum() / 3.0;
+        let mean_weight = channel_mean(weight);
         if let Some(variance) = last.variance {
             // Errors within a disc about the hit are correlated. The share of cosine rays that land in it is its form
             // factor.

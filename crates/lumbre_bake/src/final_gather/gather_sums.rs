@@ -4,6 +4,7 @@
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::color::channel_mean;
 use crate::denoise::nearness::Nearness;
 use crate::denoise::replicates::REPLICATES;
 use crate::radiosity::patch_index::PatchIndex;
@@ -27,7 +28,7 @@ impl Weights {
         self.sum += weight;
         self.squares += weight * weight;
         self.products += weight * light;
-        self.light_squares += (light.element_sum() / 3.0).powi(2);
+        self.light_squares += channel_mean(light).powi(2);
     }
 }
 
@@ -104,7 +105,6 @@ impl GatherSums {
                 weights.light_squares += self.weights[other].light_squares;
             }
             let others = count * (REPLICATES - 1) as f32;
-            let channel_mean = |light: Vec3| light.element_sum() / 3.0;
             // Sums of squares and products about the means.
             let weight_scatter = weights.squares - weights.sum * weights.sum / others;
             let cross_scatter = weights.products - light * (weights.sum / others);
@@ -129,7 +129,7 @@ impl GatherSums {
 
     /// The sum of all samples of all replicates, W/m², mean of the channels.
     pub fn total(&self) -> f32 {
-        self.sums.iter().sum::<Vec3>().element_sum() / 3.0
+        channel_mean(self.sums.iter().sum())
     }
 
     /// The share of the samples that read a texel gathered in an earlier round, in [0, 1].

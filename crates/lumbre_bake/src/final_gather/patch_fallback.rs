@@ -3,6 +3,7 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::color::wide_channel_mean;
 use crate::coverage::footprint::Texel;
 use crate::denoise::replicates::{REPLICATES, mean, variance};
 use crate::final_gather::gather_sums::GatherSums;
@@ -34,14 +35,13 @@ pub(crate) fn from_patches(
         let patch = cache.patches.at(point.triangle, Side::Front, point.at);
         patch.map_or(Vec3::ZERO, |patch| cache.patch_indirect[patch.place()])
     };
-    let channel_mean = |light: Vec3| f64::from(light.element_sum()) / 3.0;
     let (mut squared_differences, mut scatter, mut squared_light, mut count) = (0.0f64, 0.0f64, 0.0, 0u32);
     for (texel, sums) in texels.iter().zip(&*gathered).filter(|(_, sums)| sums.rays > 0) {
         let estimates = sums.estimates();
-        let mean = channel_mean(mean(&estimates));
+        let mean = wide_channel_mean(mean(&estimates));
         // The part of the difference that is the texel's own noise is not the patch's error.
         let noise = f64::from(variance(&estimates).element_sum()) / 3.0;
-        let squared_difference = (mean - channel_mean(patch_light(texel))).powi(2) - noise;
+        let squared_difference = (mean - wide_channel_mean(patch_light(texel))).powi(2) - noise;
         squared_differences += squared_difference;
         scatter += squared_difference * squared_difference;
         squared_light += mean.powi(2) - noise;
@@ -61,7 +61,7 @@ pub(crate) fn from_patches(
             sums: [light; REPLICATES],
             samples: 1,
             rays: sums.rays,
-            patch_errors: Vec2::X * REPLICATES as f32 * (relative_error * channel_mean(light)) as f32,
+            patch_errors: Vec2::X * REPLICATES as f32 * (relative_error * wide_channel_mean(light)) as f32,
             ..GatherSums::default()
         };
     }

@@ -14,6 +14,7 @@ use super::map_error::MapError;
 use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
 use crate::chunks::decide;
+use crate::color::wide_channel_mean;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::Texel;
 use crate::denoise::nearness::Nearness;
@@ -250,7 +251,7 @@ impl<'a> RoundPlanner<'a> {
         let list = &texels.list;
         let open: Vec<CoveredTexel> =
             CoveredTexel::all(list.len()).filter(|texel| !list[texel.place()].is_hidden()).collect();
-        let sum = direct.texels.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>();
+        let sum = direct.texels.iter().map(|direct| wide_channel_mean(direct.baked)).sum::<f64>();
         Self {
             neighbourhoods,
             texels: list,
@@ -295,7 +296,7 @@ impl<'a> RoundPlanner<'a> {
         let patches =
             monitor.run_interruptible(1.0, || patch_bias(neighbourhoods, texels, gathered, &raw, reads))?;
         let noise = monitor.run_interruptible(1.0, || spread(neighbourhoods, &estimates))?;
-        let bounced = estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>();
+        let bounced = estimates.iter().map(|e| wide_channel_mean(mean(e))).sum::<f64>();
         let total = self.mean_direct + bounced / self.count();
         let gather = GatherErrors {
             gathered,
@@ -376,11 +377,6 @@ impl<'a> RoundPlanner<'a> {
             wanted,
         }
     }
-}
-
-/// Mean of the channels.
-fn channel_mean(light: Vec3) -> f64 {
-    f64::from(light.element_sum()) / 3.0
 }
 
 /// The mean of each texel's replicates, minus the known bias of the patches that its rays read.

@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::incident::Hit;
 use super::radiance_cache::RadianceCache;
+use crate::color::channel_mean;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{FootprintPoint, open_texels, receiver};
 use crate::direct_light::local_light::LocalLight;
@@ -25,12 +26,12 @@ pub(crate) fn steep_texels(texels: &CoveredTexels<'_>, direct: &[Vec3], local: &
     let mut steep = vec![false; direct.len()];
     for (covered, texel) in open_texels(&texels.list) {
         let map = &texels.layout.maps[texel.object as usize];
-        let light = |near: MapTexel| direct[near.place()].element_sum() / 3.0;
+        let light = |near: MapTexel| channel_mean(direct[near.place()]);
         let around = map.neighbourhood(texel.x, texel.y, 1).map(light).filter(|light| light.is_finite());
         let (least, most) =
             around.fold((f32::INFINITY, 0.0f32), |(least, most), light| (least.min(light), most.max(light)));
         steep[texel.index.place()] =
-            most - least > STEEP * most && f64::from(most) > MIN_LIGHT * local.at(covered.place());
+            most - least > STEEP * most && f64::from(most) > MIN_LIGHT * local.at(covered);
     }
     steep
 }

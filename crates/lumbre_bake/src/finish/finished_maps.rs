@@ -1,15 +1,16 @@
 //! From the light of the covered texels to the maps that objects show: gaps filled, seams closed, resolution measured, pages composed. The order of these
 //! steps, and not the steps.
 
-use super::baked_scene::{BakedMap, BakedObject, FilledTexels, baked_objects};
+use super::baked_maps::{BakedMap, BakedObject, FilledTexels, baked_objects};
 use super::fill::fill;
 use super::pages::Pages;
 use super::resolution_error::{DensePoint, compare};
 use super::seams::{MapValues, Maps, close_seams};
 use super::separate_light::separate;
 use crate::final_gather::lit_texels::LitTexels;
-use crate::monitor::{BakeMonitor, Stage};
+use crate::monitor::BakeMonitor;
 use crate::scene::SceneObject;
+use crate::stage::Stage;
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// The objects of a scene with their finished maps. `points` are what the finished maps are compared with, to measure what their resolution costs.

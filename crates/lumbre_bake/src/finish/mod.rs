@@ -1,7 +1,7 @@
 //! From the light of the covered texels to finished maps: gaps are filled, seams closed and pages composed, and the
 //! error of the map's resolution is measured. Not the computation of the light.
 
-pub(crate) mod baked_scene;
+pub(crate) mod baked_maps;
 pub(crate) mod fill;
 pub(crate) mod finished_maps;
 pub(crate) mod pages;

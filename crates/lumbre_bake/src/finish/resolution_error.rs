@@ -12,12 +12,13 @@ use crate::coverage::footprint::{Footprint, FootprintPoint, Texel, receiver};
 use crate::denoise::replicates::REPLICATES;
 use crate::final_gather::gather_sums::GatherSums;
 use crate::final_gather::radiance_cache::RadianceCache;
-use crate::monitor::{BakeMonitor, Stage};
+use crate::monitor::BakeMonitor;
 use crate::report::ResolutionReport;
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
 use crate::scene::Receiver;
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::sources::light_sources::Sources;
+use crate::stage::Stage;
 use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions, BakeReport};
 

@@ -55,12 +55,12 @@ pub(crate) struct ProbeSample {
 impl ProbeLight<'_> {
     /// The light at a point, canonical units.
     pub fn at(&self, position: Vec3, seed: u32, index: u32) -> ProbeSample {
-        let mut runs = [[Vec3::ZERO; 6]; REPLICATES];
+        let mut replicates = [[Vec3::ZERO; 6]; REPLICATES];
         let mut probe = ProbeSample::default();
         let mut backs = 0u32;
-        for (replicate, run) in runs.iter_mut().enumerate() {
+        for (replicate, sums) in replicates.iter_mut().enumerate() {
             let sequence = Sequence::new(seed, Stream::ProbeSphere(replicate as u32), index);
-            backs += self.bounces(position, sequence, run);
+            backs += self.bounces(position, sequence, sums);
             probe.rays += u64::from(self.effort.sphere);
         }
         let all = self.effort.sphere * REPLICATES as u32;
@@ -70,8 +70,8 @@ impl ProbeLight<'_> {
         }
         let count = REPLICATES as f32;
         for (side, (light, normal)) in probe.cube.0.iter_mut().zip(SIDES).enumerate() {
-            *light = runs.iter().map(|run| run[side]).sum::<Vec3>() / count;
-            let squares: Vec3 = runs.iter().map(|run| (run[side] - *light).powf(2.0)).sum();
+            *light = replicates.iter().map(|sums| sums[side]).sum::<Vec3>() / count;
+            let squares: Vec3 = replicates.iter().map(|sums| (sums[side] - *light).powf(2.0)).sum();
             let variance_of_mean = squares / (count * (count - 1.0));
             let sequence = Sequence::new(seed, Stream::ProbeSide(side as u32), index);
             let pilot =

@@ -22,9 +22,10 @@ pub(crate) use light::ProbeSample;
 use self::grid::Grid;
 use crate::chunks::in_chunks_uncheckpointed;
 use crate::final_gather::radiance_cache::RadianceCache;
-use crate::monitor::{BakeMonitor, Stage};
+use crate::monitor::BakeMonitor;
 use crate::scene::{BakeScene, StaticScene};
 use crate::sources::light_sources::Sources;
+use crate::stage::Stage;
 use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
 
 /// An irradiance volume, and where it is.

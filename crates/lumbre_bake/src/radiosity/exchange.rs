@@ -12,12 +12,14 @@ use super::sampling_guide::SamplingGuide;
 use super::size_error::size_error;
 use super::solution::gather;
 use crate::chunks::in_chunks;
-use crate::monitor::{BakeMonitor, Stage};
+use crate::color::wide_channel_mean;
+use crate::monitor::BakeMonitor;
 use crate::options::Solver;
 use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, Receiver};
 use crate::sources::light_sources::Sources;
+use crate::stage::Stage;
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// The light of all patches, which the final gather reads.
@@ -110,7 +112,7 @@ impl Exchange {
         })?;
         let by_size = monitor.run_interruptible(0.7, || {
             let reflectance = mean_reflectances(&patches.list);
-            let arriving = |(direct, sky): (&Vec3, &Vec3)| channel_mean(*direct + *sky);
+            let arriving = |(direct, sky): (&Vec3, &Vec3)| wide_channel_mean(*direct + *sky);
             let first: Vec<f64> = direct.iter().zip(&sky).map(arriving).collect();
             size_error(scene, &patches, side, &factors, (&reflectance, &first), (options.solver, TOLERANCE))
         })?;
@@ -227,13 +229,9 @@ pub(crate) fn patch_direct(
     (direct.total() / open, direct.rays)
 }
 
-pub(crate) fn channel_mean(color: Vec3) -> f64 {
-    f64::from(color.element_sum()) / 3.0
-}
-
 /// Reflectance of each patch, mean of the channels.
 pub(crate) fn mean_reflectances(patches: &[Patch]) -> Vec<f64> {
-    patches.iter().map(|patch| channel_mean(patch.reflectance)).collect()
+    patches.iter().map(|patch| wide_channel_mean(patch.reflectance)).collect()
 }
 
 /// Irradiance of each patch by the sky.
@@ -255,10 +253,14 @@ fn sampling_error(
         let factors = &halves[half];
         let lit = direct[half].iter().zip(&sky[half]).zip(patches);
         let emission: Vec<f64> =
-            lit.map(|((light, sky), patch)| channel_mean((*light + *sky) * patch.reflectance)).collect();
+            lit.map(|((light, sky), patch)| wide_channel_mean((*light + *sky) * patch.reflectance)).collect();
         let solution = solver.solve(factors, &reflectance, &emission, TOLERANCE);
         let gathered = gather(factors, &solution.radiosity);
-        gathered.iter().zip(&sky[half]).map(|(light, sky)| light + channel_mean(*sky)).collect::<Vec<f64>>()
+        gathered
+            .iter()
+            .zip(&sky[half])
+            .map(|(light, sky)| light + wide_channel_mean(*sky))
+            .collect::<Vec<f64>>()
     });
     a.iter().zip(&b).map(|(a, b)| (0.5 * (a - b)) as f32).collect()
 }

@@ -8,12 +8,13 @@ use std::time::Instant;
 use bevy_ecs::world::World;
 use glam::Vec3;
 
-use super::exchange::{channel_mean, mean_reflectances, patch_direct};
+use super::exchange::{mean_reflectances, patch_direct};
 use super::exchange_tests::{MODELS, model};
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use super::solution::gather;
+use crate::color::wide_channel_mean;
 use crate::monitor::BakeMonitor;
 use crate::options::{FormFactorMethod, Solver};
 use crate::sampling::{Sequence, Stream};
@@ -124,9 +125,9 @@ fn cosine_rays_and_global_lines_converge_to_the_same_light() {
 /// Irradiance of each patch by bounces and by the sky, mean of the channels.
 fn solution(factors: &FormFactors, patches: &Patches, direct: &[Vec3], sky: Vec3) -> Vec<f64> {
     let reflectance = mean_reflectances(&patches.list);
-    let sky: Vec<f64> = factors.sky.iter().map(|&share| f64::from(share) * channel_mean(sky)).collect();
+    let sky: Vec<f64> = factors.sky.iter().map(|&share| f64::from(share) * wide_channel_mean(sky)).collect();
     let emission: Vec<f64> =
-        (0..direct.len()).map(|i| reflectance[i] * (channel_mean(direct[i]) + sky[i])).collect();
+        (0..direct.len()).map(|i| reflectance[i] * (wide_channel_mean(direct[i]) + sky[i])).collect();
     let solved = Solver::default().solve(factors, &reflectance, &emission, 1e-8);
     gather(factors, &solved.radiosity).iter().zip(sky).map(|(bounced, sky)| bounced + sky).collect()
 }

@@ -7,6 +7,7 @@ use crate::coverage::footprint::Texel;
 use crate::direct_light::local_light::LocalLight;
 use crate::final_gather::gather_sums::GatherSums;
 use crate::final_gather::reused_gather::ReusedGather;
+use crate::texel_index::CoveredTexel;
 
 /// Largest error by reuse as a share of the requested error: the RMSE of all texels, and that of any one texel. The
 /// error by reuse is systematic, while the rest of the error is noise, so it gets the smaller share.
@@ -28,7 +29,8 @@ pub(super) fn choose(
     let relative_error = |index: usize| -> Option<f64> {
         let known = changes.known[index].filter(|known| known.gathered.samples > 0)?;
         let error = f64::from(known.reuse_error + change[index]);
-        (error <= MAX_TEXEL_SHARE * target * local.at(index)).then_some(error / local.at(index))
+        (error <= MAX_TEXEL_SHARE * target * local.at(CoveredTexel::new(index)))
+            .then_some(error / local.at(CoveredTexel::new(index)))
     };
     let mut candidates: Vec<(f64, usize)> =
         (0..texels.len()).filter_map(|index| Some((relative_error(index)?, index))).collect();
@@ -46,7 +48,7 @@ pub(super) fn choose(
         }
         if let Some(known) = changes.known[index] {
             reused.gathered[index] = known.gathered;
-            reused.reuse_error[index] = (error * local.at(index)) as f32;
+            reused.reuse_error[index] = (error * local.at(CoveredTexel::new(index))) as f32;
         }
     }
     reused

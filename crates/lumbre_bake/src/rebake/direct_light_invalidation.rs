@@ -95,7 +95,7 @@ pub(crate) fn shadowed(
         .par_iter()
         .map(|members| {
             let mut points = Vec::new();
-            for texel in members.iter().map(|&member| &texels[member as usize]) {
+            for texel in members.iter().map(|member| &texels[member.place()]) {
                 positions_of(scene, texel, &mut points);
                 if !scene.triangles[texel.triangle as usize].flat {
                     // Light is computed at points of the smooth surface, which lies above the facets, most of all in

@@ -239,7 +239,7 @@ impl<'a> IndirectChange<'a> {
     ) -> Result<Vec<f32>, BakeError> {
         let of_blocks = in_chunks(self.blocks.members.len(), monitor, |block| {
             let members: Vec<&Texel> =
-                self.blocks.members[block].iter().map(|&member| &texels[member as usize]).collect();
+                self.blocks.members[block].iter().map(|member| &texels[member.place()]).collect();
             if members.is_empty() {
                 return 0.0f32;
             }

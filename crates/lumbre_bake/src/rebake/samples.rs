@@ -1,6 +1,7 @@
 //! The samples of every texel of a bake, before they became a map, from which the next bake of a changed scene can keep
 //! some. The file format is in `samples_file`.
 
+use crate::color::channel_mean;
 use crate::rebake::fingerprints::{fingerprint, first_triangles};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -126,7 +127,7 @@ impl Weights {
     /// For samples of weight 1 that all brought the same light.
     pub fn of_equal(sum: Vec3, samples: u32) -> Self {
         let count = samples as f32;
-        let light_squares = (sum.element_sum() / 3.0).powi(2) / count.max(1.0);
+        let light_squares = channel_mean(sum).powi(2) / count.max(1.0);
         Self { sum: count, squares: count, products: sum, light_squares }
     }
 }

@@ -1,5 +1,5 @@
-//! The result of a bake as plain data: maps, meshes with the coordinates to read them by, probes. Not how they get into
-//! a World: that is `apply`.
+//! Objects and maps as plain data: texels of E/π with their errors, on pages where objects share one, and meshes with
+//! the coordinates to read them by. Not how they get into a World: that is `apply`.
 
 use std::collections::HashSet;
 use std::f32::consts::PI;
@@ -8,31 +8,11 @@ use std::sync::Arc;
 use bevy_ecs::prelude::Component;
 use glam::Vec3;
 use lumbre_mesh::TriangleMesh;
-use lumbre_scene::{
-    IrradianceVolume, LightmapEncoding, LightmapImage, MaterialTextures, SeparateLight, Transform,
-};
+use lumbre_scene::{LightmapEncoding, LightmapImage, MaterialTextures, SeparateLight};
 
 use super::pages::Pages;
 use super::separate_light::Separate;
 use crate::scene::{LightmapLayout, SceneObject, textures_of};
-use crate::{BakeReport, Samples};
-
-/// What a bake has made of a [`StaticScene`](crate::StaticScene).
-#[derive(Debug)]
-#[non_exhaustive]
-pub struct BakedScene {
-    /// One per object of the scene, in the scene's order; empty where there was nothing to bake.
-    pub objects: Vec<BakedObject>,
-    /// The maps that objects show.
-    pub maps: Vec<BakedMap>,
-    /// The light for moving objects, with its place in the world, if it was requested.
-    pub volume: Option<(Transform, IrradianceVolume)>,
-    /// What was done, what it cost, and how accurate the result is.
-    pub report: BakeReport,
-    /// The samples for [`Bake::former`](crate::Bake::former) of the next bake, if they were requested and there was
-    /// something to keep.
-    pub samples: Option<Samples>,
-}
 
 /// An object with its light.
 #[derive(Clone, Debug)]
@@ -42,7 +22,7 @@ pub struct BakedObject {
     pub meshes: Vec<Arc<TriangleMesh>>,
     /// One per primitive: its textures. They read other coordinates than before where the lightmap needed theirs.
     pub textures: Vec<Option<MaterialTextures>>,
-    /// Index of its map in [`BakedScene::maps`].
+    /// Index of its map in [`BakedScene::maps`](crate::BakedScene::maps).
     pub map: usize,
 }
 
