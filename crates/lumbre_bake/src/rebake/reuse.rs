@@ -1,5 +1,5 @@
-//! What a bake takes from a former one and leaves for the next: the frame around the stages, which know nothing of it. Not the choice of what is kept:
-//! that is `choice`.
+//! What a bake takes from a former one and leaves for the next. The stages of direct and gathered light get what
+//! may be reused as an input; all others know nothing of it. Not the choice of what is kept: that is `choice`.
 
 use super::changes::{Changes, ReusableBake};
 use super::samples::{SampleCollector, Samples};

@@ -142,7 +142,7 @@ fn study() -> Study {
     Study {
         name: "reflection".into(),
         title: "Reflection models compared with Phong's".into(),
-        question: "Blinn's half vector with Phong's exponent, with four times that exponent, with a matched exponent or with an energy-conserving lobe, and the microfacets of Torrance and Sparrow: how much do their highlights differ from Phong's, and do they cost more, as document [M] says of Blinn's?".into(),
+        question: "Blinn's half vector with Phong's exponent, with four times that exponent, with a matched exponent or with an energy-conserving lobe, and the microfacets of Torrance and Sparrow: how much do their highlights differ from Phong's, and do they cost more, as document [M] says of Blinn's model with Fresnel's term and geometric attenuation, which is that of Torrance and Sparrow here?".into(),
         reference: "the same ball or sheet under Phong's model with the same exponent and the same light".into(),
         plots: vec![
             Plot {
