@@ -129,9 +129,13 @@ fn against_the_ray_tree(world: &mut World, options: &FrameOptions, depth: u32) -
 
 #[test]
 fn a_sheet_shows_what_the_ray_tree_shows() {
-    for (fresnel, samples, fog) in
-        [(false, false, false), (true, false, false), (true, true, false), (true, false, true)]
-    {
+    for (fresnel, samples, fog) in [
+        (false, false, false),
+        (false, true, false),
+        (true, false, false),
+        (true, true, false),
+        (true, false, true),
+    ] {
         let mut world = room();
         if fog {
             let mode = FogMode::Exponential { density: 0.1 };

@@ -466,11 +466,12 @@ pub struct Cost {
     /// is missing.
     #[arg(long, num_args = 2, value_names = ["A.json", "B.json"], conflicts_with_all = ["quick", "counts_only", "studies", "resume", "size", "seed", "quiet"])]
     pub compare: Option<Vec<PathBuf>>,
-    /// Counts, errors and times that differ by less than this factor count as equal.
+    /// Counts and errors that differ by less than this factor count as equal. Times must also differ by more
+    /// than two runs of one program do: by 1.8, beyond what all times of their study have in common.
     #[arg(long, value_name = "X", default_value = "1.1", value_parser = factor, conflicts_with = "output", allow_negative_numbers = true)]
     pub factor: f64,
-    /// Exit with status 1 also for times that increased, by more than the factor and with quartiles that do
-    /// not overlap.
+    /// Exit with status 1 also for times that increased: those of single points, or of a whole study by more
+    /// than 2.5.
     #[arg(long, conflicts_with = "output")]
     pub times: bool,
 }

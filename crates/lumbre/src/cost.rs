@@ -101,7 +101,7 @@ fn compare(asked: &Cost, reports: &[PathBuf]) -> anyhow::Result<()> {
     let slower = changes.iter().filter(|change| change.is_slower()).count();
     writeln!(
         out,
-        "{worse} counts, errors or points are worse beyond a factor of {}, and {slower} times; {} other changes",
+        "{worse} counts, errors or points are worse beyond a factor of {}, and {slower} times beyond noise and drift; {} other changes",
         asked.factor,
         changes.len() - worse - slower
     )?;

@@ -115,7 +115,8 @@ fn write_auxiliary(
         AovValues::Colors(values) => {
             let encoded = |value: &DVec3| value.clamp(DVec3::ZERO, DVec3::ONE).map(encode_srgb);
             write_bytes(path, size, values.iter().map(|value| bytes(encoded(value))))?;
-            Ok(None)
+            let meaning = "white is a radiance of 1 or more, or an error that is not known yet";
+            Ok((found.aov == Aov::StandardError).then(|| meaning.to_owned()))
         }
         AovValues::Directions(values) => {
             write_bytes(path, size, values.iter().map(|value| bytes((*value + 1.0) * 0.5)))?;
@@ -145,7 +146,7 @@ fn write_auxiliary(
 
 /// Returns true if the picture holds radiance, which has to be converted for display.
 fn is_light(aov: &Aov) -> bool {
-    matches!(aov, Aov::Light(_) | Aov::Source { .. } | Aov::EverySource { .. } | Aov::StandardError)
+    matches!(aov, Aov::Light(_) | Aov::Source { .. } | Aov::EverySource { .. })
 }
 
 /// Returns the path of an auxiliary picture beside the main one, without characters that file systems

@@ -145,9 +145,10 @@ fn meaningless(asked: &Trace) -> Vec<&'static str> {
             "--aov standard-error is for --integrator path: the ray tree has no noise, and every pixel of that picture is infinite",
         ),
         (
-            asked.frame.every_shadow || asked.frame.rendering_path.is_some() || asked.frame.no_msaa,
-            "--every-shadow, --rendering-path and --no-msaa change nothing: every lamp casts its shadow, and there is one sample per pixel unless --samples asks for more",
+            asked.frame.every_shadow || asked.frame.rendering_path.is_some(),
+            "--every-shadow and --rendering-path change nothing: every lamp casts its shadow, and rays have no rendering path",
         ),
+        (asked.frame.no_msaa, "--no-msaa changes nothing: --samples says how many samples a pixel has"),
         (!asked.frame.without.is_empty(), "--without is for frames: rays have every effect of the scene"),
         (!trees && asked.frame.msaa, "--msaa is for the ray tree: paths take --samples"),
         (trees && asked.resume, "--resume is for --integrator path: ray trees begin anew"),

@@ -120,7 +120,8 @@ const DEVIATION: f64 = 1.4826;
 /// How the times of a study differ as a whole.
 #[derive(Clone, Copy, Debug)]
 struct Drift {
-    /// The median ratio.
+    /// The median ratio; of an even number, the smaller of the two in the middle, so that half of a study
+    /// which has become slower stands out against the other half.
     factor: f64,
     /// The factor by which ratios scatter about it.
     scatter: f64,
@@ -137,7 +138,9 @@ impl Drift {
         if ratios.len() < MIN_POINTS_OF_DRIFT {
             return None;
         }
-        let factor = Spread::of(ratios)?.median;
+        let mut sorted = ratios.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let factor = *sorted.get((sorted.len() - 1) / 2)?;
         let apart: Vec<f64> = ratios.iter().map(|ratio| (ratio / factor).ln().abs()).collect();
         let scatter = (DEVIATION * Spread::of(&apart)?.median).exp();
         Some(Self { factor, scatter, points: ratios.len() })
@@ -319,7 +322,9 @@ fn differences(before: &Point, after: &Point, factor: f64, drift: Drift) -> Vec<
     if let (Some(was), Some(is)) = (before.milliseconds, after.milliseconds) {
         let expected = was.times(drift.factor);
         let apart = expected.is_below(&is) || is.is_below(&expected);
-        let noise = factor.max(NOISE_OF_RUNS).max(drift.scatter.powf(SCATTERS));
+        // However much a study scatters, no point may differ by more than whole machines do.
+        let scatter = drift.scatter.powf(SCATTERS).min(DRIFT_OF_MACHINES);
+        let noise = factor.max(NOISE_OF_RUNS).max(scatter);
         if apart && is_beyond(expected.median, is.median, noise) {
             found.push(What::Time { before: was, after: is, drift: drift.factor });
         }

@@ -160,6 +160,19 @@ fn a_planted_slow_down_is_found_and_noise_is_not() {
     assert!(compare_reports(&before, &slower, 2.5).is_empty());
 }
 
+/// Half of a study that takes four times as long is found, although the ratios then scatter widely.
+#[test]
+fn a_study_of_which_half_is_slower_is_found() {
+    let (before, mut after) = (drifted(1.0), drifted(1.0));
+    let half = after.studies[0].points.len() / 2;
+    for point in &mut after.studies[0].points[..half] {
+        let time = point.milliseconds.as_mut().unwrap();
+        (time.lower, time.median, time.upper) = (4.0 * time.lower, 4.0 * time.median, 4.0 * time.upper);
+    }
+    let found = compare_reports(&before, &after, 1.1);
+    assert_eq!(found.iter().filter(|change| change.is_slower()).count(), half, "{found:?}");
+}
+
 /// Two dozen points, of which each takes `drift` times as long as usual, up to a tenth more or less.
 fn drifted(drift: f64) -> CostReport {
     let times = (0..24).map(|number: u32| {

@@ -187,7 +187,8 @@ fn escaped(name: &str) -> String {
 }
 
 fn escaped_markup(name: &str) -> String {
-    name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+    let printable: String = name.chars().filter(|c| !c.is_control()).collect();
+    printable.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Width and height of a view in pixels.

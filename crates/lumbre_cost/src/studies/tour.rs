@@ -24,8 +24,7 @@ use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, St
 const MAX_CAMERAS: usize = 16;
 const FEW_CAMERAS: usize = 1;
 /// Rays per pixel of the reference.
-const SAMPLES: u32 = 64;
-const FEW_SAMPLES: u32 = 16;
+const SAMPLES: u32 = 16;
 /// Seconds for the frames of one camera.
 const SECONDS: f64 = 4.0;
 
@@ -54,7 +53,7 @@ const CHANGES: &[Change] = &[
         apply: |world, _| every_lamp_casts(world),
     },
     Change {
-        name: "shadow maps of four times the resolution",
+        name: "the finest shadow maps",
         arguments: " --shadow-resolution 4",
         apply: |world, _| frame_settings(world, |frame| frame.shadow_resolution = 4.0),
     },
@@ -100,20 +99,17 @@ fn frame_settings(world: &mut World, change: fn(&mut FrameSettings)) {
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    over_scenes_made(
-        conditions,
-        study(conditions),
-        ("mirror-and-glass", mirror_and_glass),
-        |scene, told, measured| of_scene(conditions, scene, told, measured),
-    )
+    over_scenes_made(conditions, study(), ("mirror-and-glass", mirror_and_glass), |scene, told, measured| {
+        of_scene(conditions, scene, told, measured)
+    })
 }
 
-fn study(conditions: &Conditions<'_>) -> Study {
+fn study() -> Study {
     Study {
         name: "tour".into(),
         title: "Tour of the cameras".into(),
         question: "How large are the errors of the frames of a scene's cameras compared with the ray tree, which has shadows, mirrors and glass? Which single change would reduce each error most, and at what cost?".into(),
-        reference: format!("the documents' ray tree, the mean of {} rays per pixel", samples(conditions)),
+        reference: format!("the documents' ray tree, the mean of {SAMPLES} rays per pixel"),
         plots: vec![Plot {
             title: "Error over time".into(),
             across: Quantity::Milliseconds,
@@ -123,10 +119,6 @@ fn study(conditions: &Conditions<'_>) -> Study {
         }],
         ..Study::default()
     }
-}
-
-fn samples(conditions: &Conditions<'_>) -> u32 {
-    conditions.unless_quick(SAMPLES, FEW_SAMPLES)
 }
 
 /// Returns the cameras of a scene with their names, or with their numbers if they have none.
@@ -193,12 +185,11 @@ fn of_camera(
         Ok((world, camera))
     };
     let (mut world, camera) = opened()?;
-    let samples = samples(conditions);
     let mut exact = |samples| {
         let options = TraceOptions { camera, samples: Some(samples), ..ray_tree(conditions) };
         traced_world(conditions, &mut world, &options).map(|(picture, _)| picture)
     };
-    let (exact, rough) = (exact(samples)?, exact(samples / 4)?);
+    let (exact, rough) = (exact(SAMPLES)?, exact(SAMPLES / 4)?);
     // Were the samples random, the variance of the difference would be three times that of the mean of all
     // samples. Evenly spread ones are better than that.
     let differ = compared(&exact, &rough, ErrorOver::Picture).map_or(0.0, |found| found.error.relative_rmse);

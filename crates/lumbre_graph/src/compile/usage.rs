@@ -21,6 +21,15 @@ pub(super) fn infer(declarations: &Declarations, options: CompileOptions) -> Vec
             Shape::Buffer(buffer) => buffer.usage |= declared.access.buffer_usage(),
         }
     }
+    // wgpu creates textures of several samples only as attachments, even if they are only copied to and read.
+    for (shape, resource) in shapes.iter_mut().zip(&declarations.resources) {
+        if let Shape::Texture(texture) = shape
+            && resource.origin != Origin::Imported
+            && texture.sample_count > 1
+        {
+            texture.usage |= wgpu::TextureUsages::RENDER_ATTACHMENT;
+        }
+    }
     if options.probe {
         for (shape, resource) in shapes.iter_mut().zip(&declarations.resources) {
             if let Shape::Texture(texture) = shape
