@@ -145,7 +145,7 @@ fn a_light_alone_is_the_picture_without_the_others() {
 #[test]
 fn direct_light_of_paths_is_all_that_one_reflection_brings() {
     // A path of depth d has d turns, and samples the lights at its last surface too: at depth 0 it finds the light
-    // that one surface reflects, except the sky's, which is never sampled as a light.
+    // that one surface reflects, except that of the sky and of the fog in mirrors, which are never sampled as lights.
     let direct_of = |options: &TraceOptions, world: &mut World| {
         let aovs = asked(&["direct"]);
         let (picture, _) = draw(world, &TraceOptions { aovs, ..options.clone() });
@@ -155,7 +155,8 @@ fn direct_light_of_paths_is_all_that_one_reflection_brings() {
     let [of_depth_0, of_depth_1, of_depth_2] =
         [0, 1, 2].map(|depth| TraceOptions { depth: Some(depth), ..paths(32, 16) });
     let mut without_sky = room();
-    without_sky.resource_mut::<SceneSettings>().sky = Vec3::ZERO;
+    let mut settings = without_sky.resource_mut::<SceneSettings>();
+    (settings.sky, settings.fog) = (Vec3::ZERO, None);
     let (direct, picture) = direct_of(&of_depth_0, &mut without_sky);
     assert!(apart(&picture, &[&direct]) < 1e-12, "a path without turns finds direct light only");
     let (with_weights, _) = direct_of(&paths(32, 16), &mut without_sky);
@@ -164,7 +165,7 @@ fn direct_light_of_paths_is_all_that_one_reflection_brings() {
     let relative = sum(&direct) / sum(&with_weights) - 1.0;
     println!("direct light of paths of depth 0 over that of all paths: {:+.2} %", 100.0 * relative);
     assert!(relative.abs() < 0.02, "{relative}");
-    // From depth 1 on, all of it is found, the sky's too, and by the same samples: no depth changes it.
+    // From depth 1 on, all of it is found, that of sky and fog too, and by the same samples: no depth changes it.
     let (direct, picture) = direct_of(&of_depth_1, &mut room());
     let (deeper, _) = direct_of(&of_depth_2, &mut room());
     let (whole, all) = direct_of(&paths(32, 16), &mut room());
