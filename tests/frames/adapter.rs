@@ -1,28 +1,28 @@
 //! One device for all tests of this binary, and frames drawn on it with the finite-value probe on.
 
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 
 use bevy_ecs::world::World;
 use glam::DVec3;
 use lumbre_render::{
     Accounting, Display, FrameOptions, FrameReport, Gpu, Offscreen, OffscreenFormat, RenderError, Renderer,
 };
+use lumbre_tests::device;
 
 /// Validation errors of wgpu that no error scope caught.
 static COMPLAINTS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Returns the shared device. Without a driver the tests fail with a message on what to install.
+/// Returns the shared device, whose validation errors are kept. Without a driver the tests fail with a message on
+/// what to install.
 pub fn gpu() -> &'static Gpu {
-    static GPU: OnceLock<Gpu> = OnceLock::new();
-    GPU.get_or_init(|| match Gpu::headless() {
-        Ok(gpu) => {
-            gpu.device.on_uncaptured_error(Arc::new(|error| {
-                COMPLAINTS.lock().unwrap_or_else(PoisonError::into_inner).push(format!("{error}"));
-            }));
-            gpu
-        }
-        Err(error) => panic!("{error}"),
-    })
+    static LISTENS: Once = Once::new();
+    let gpu = device::gpu();
+    LISTENS.call_once(|| {
+        gpu.device.on_uncaptured_error(Arc::new(|error| {
+            COMPLAINTS.lock().unwrap_or_else(PoisonError::into_inner).push(format!("{error}"));
+        }));
+    });
+    gpu
 }
 
 /// Options for unchanged radiance in full precision, with the probe on.

@@ -78,8 +78,13 @@ fn a_frame_without_a_display_pass_has_the_numbers_of_the_f64_twin() {
             let expected =
                 display_color(display, format, 0.7, radiance.truncate()).clamp(Vec3::ZERO, Vec3::ONE);
             for (byte, expected) in pixel.iter().zip(expected.to_array()) {
-                // Half a step of rounding, and the error of f32's powers.
-                assert!((f32::from(*byte) - 255.0 * expected).abs() < 0.52, "{pixel:?} {expected}");
+                // The rounding of a device, at most 0.6 of a step (Direct3D 11.3, section 3.2.3.6; half a step in
+                // software), and the error of f32's powers.
+                let rounding = if gpu().is_software() { 0.5 } else { 0.6 };
+                assert!(
+                    (f32::from(*byte) - 255.0 * expected).abs() < rounding + 0.02,
+                    "{pixel:?} {expected}"
+                );
             }
         }
     }

@@ -231,7 +231,7 @@ const ROWS: &[Row] = &[
     },
     Row {
         effect: "deferred shading",
-        called_for_by: "`RenderingPath::Deferred`; by itself where a processor draws many lights with a range",
+        called_for_by: "`RenderingPath::Deferred`; by itself under many lights with a range that meet small triangles",
         features: &["DEFERRED"],
         before: |scene| spawn(scene, ranged(Light::point(Vec3::splat(9.0)))),
         add: |scene| scene.options.rendering_path = RenderingPath::Deferred,

@@ -20,14 +20,19 @@ use lumbre_tests::panes::{image, sharp};
 use lumbre_tests::twin::{self, TwinOptions};
 use lumbre_trace::{Integrator, TraceOptions, trace};
 
-use crate::adapter::{Canvas, draw, linear};
+use crate::adapter::{Canvas, draw, gpu, linear};
 
 const SIZE: usize = 96;
 
-/// Half floats of the probes' light, 2^-11 relative, and a filter's weights, 2^-9 of the step between probes along
-/// each of three axes (Vulkan's minimum precision): for light up to 1.5 with steps up to 1, reflected with at most
-/// 0.9.
-const BOUND: f64 = 0.9 * (1.5 / 2048.0 + 3.0 / 512.0);
+/// Half floats of the probes' light, 2^-11 relative, and a filter's weights of eight bits along each of three axes,
+/// for light up to 1.5 with steps up to 1 between probes, reflected with at most 0.9. Software rounds the weights to
+/// 2^-9; graphics processors may also cut them off, to 2^-8 (Vulkan does not say which). An NVIDIA H100 is off by
+/// 4.1e-2 at one of 2,558 pixels.
+fn bound() -> f64 {
+    // Beside probes inside of walls the light is divided by the sum of the others' weights, here a quarter or more.
+    let weight = if gpu().is_software() { 1.0 / 512.0 } else { 1.0 / 256.0 / 0.25 };
+    0.9 * (1.5 / 2048.0 + 3.0 * weight)
+}
 
 /// Pseudo-random numbers that are the same in every run.
 fn numbers(seed: u64) -> impl FnMut() -> f32 {
@@ -143,8 +148,8 @@ fn every_shading_agrees_with_the_twin_and_counts_nothing_twice() {
         for difference in [textured, alone] {
             worst.largest = worst.largest.max(difference.largest);
         }
-        println!("{}: {:.1e} at most of {BOUND:.1e}", shading.name(), worst.largest);
-        assert!(worst.largest < BOUND, "{}: {worst:?}", shading.name());
+        println!("{}: {:.1e} at most of {:.1e}", shading.name(), worst.largest, bound());
+        assert!(worst.largest < bound(), "{}: {worst:?}", shading.name());
         // Negative control: different light in one cell is detected.
         let mut changed = world.get_mut::<IrradianceVolume>(volume).unwrap();
         changed.cubes[8].0.iter_mut().for_each(|side| *side += 0.3);
@@ -319,7 +324,7 @@ fn the_ray_tree_reads_what_a_frame_reads() {
         compare(&frame.iter().copied().map(Some).collect::<Vec<_>>(), &traced)
     });
     // The same bound, plus one eight-bit step, as in other comparisons of frames and rays.
-    assert!(differences[0].largest < BOUND + 1.0 / 255.0, "{:?}", differences[0]);
+    assert!(differences[0].largest < bound() + 1.0 / 255.0, "{:?}", differences[0]);
     differences.reverse();
     assert!(differences[0].largest > 0.1, "negative control: {:?}", differences[0]);
 }

@@ -9,6 +9,8 @@ use lumbre_optics::{FlatRule, FogMode, Light, Material, ReflectionModel, SpotCon
 use lumbre_render::{Display, FrameOptions};
 use lumbre_scene::{SceneSettings, Transform};
 use lumbre_tests::compare::{Difference, compare};
+use lumbre_tests::device::subpixel_bits;
+use lumbre_tests::twin::{self, TwinOptions};
 
 use crate::adapter::{draw, linear};
 
@@ -81,9 +83,16 @@ impl Reference {
 
     fn difference(&self, world: &mut World, options: &FrameOptions) -> Difference {
         let (got, _) = draw(world, self.size.0, self.size.1, options);
+        let (width, height) = (self.size.0 as usize, self.size.1 as usize);
+        let mut drawn = self.world();
+        let moved = twin::by_moved_corners(&mut drawn, width, height, TwinOptions::default(), 1.0);
+        let certain = twin::draw(&mut drawn, width, height, TwinOptions::default()).uncertain;
+        let interior =
+            self.interior.iter().zip(certain).map(|(color, uncertain)| color.filter(|_| !uncertain));
         // Where the display does not clamp, as in one control, the picture is clamped only at the end.
-        let got: Vec<_> = got.into_iter().map(|color| Some(color.clamp(DVec3::ZERO, DVec3::ONE))).collect();
-        compare(&got, &self.interior)
+        let got = got.into_iter().map(|color| color.clamp(DVec3::ZERO, DVec3::ONE));
+        let got: Vec<_> = got.zip(moved).map(|(color, moved)| Some(color - moved)).collect();
+        compare(&got, &interior.collect::<Vec<_>>())
     }
 }
 
@@ -97,7 +106,9 @@ fn frames_equal_opengl() {
         // A third of the frame: the flat case has the most edges.
         assert!(pixels > reference.interior.len() / 3, "{name}: {pixels} pixels are too few to compare");
         assert!(equal(&difference), "{name}: {difference:?}");
-        assert!(largest <= LARGEST_HERE && mean <= MEAN_HERE, "{name}: {difference:?}");
+        // Where corners are moved, clamped colours of vertices are not those that the twin's are corrected by.
+        let largest_here = if subpixel_bits().is_some() { LARGEST } else { LARGEST_HERE };
+        assert!(largest <= largest_here && mean <= MEAN_HERE, "{name}: {difference:?}");
     }
 }
 

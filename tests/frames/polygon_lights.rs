@@ -24,8 +24,9 @@ const SIZE: usize = 144;
 /// Highlights add 16 powers with n = 40, each good to 40·4·2⁻²⁴ = 10⁻⁵ relative, of a sum near 0.3, at points whose
 /// positions along the lamp are off by a few ulp. Measured: at most 9·10⁻⁶, where a lamp almost touches the floor.
 const LARGEST: f64 = 2e-5;
-/// The mean of the same errors: measured at most 4·10⁻⁷.
-const RELATIVE_L2: f64 = 1e-6;
+/// The mean of the same errors, a tenth of the largest: measured at most 4·10⁻⁷ on llvmpipe, and 1.2·10⁻⁶ on an NVIDIA
+/// H100, whose logarithms and exponentials use more of what WGSL allows.
+const RELATIVE_L2: f64 = 2e-6;
 
 fn glowing(radiance: Vec3) -> Material {
     Material {

@@ -17,6 +17,7 @@ use lumbre_scene::{
     AmbientCube, Camera, DynamicObject, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
     MaterialTextures, Mesh, Projection, SceneSettings, Transform,
 };
+use lumbre_tests::device::{apart_by_moved_corners, filter_step};
 use lumbre_tests::panes::{image, sharp};
 
 use crate::adapter::{Canvas, draw, gpu, linear};
@@ -34,10 +35,15 @@ fn by(rendering_path: RenderingPath) -> FrameOptions {
     FrameOptions { rendering_path, shading: Some(Shading::Phong), ..linear() }
 }
 
+/// Compares two frames of [`SIZE`]. Deferred lighting finds a point on its pixel's ray, forward lighting on the
+/// triangle between the corners' exact places; a rasterizer that moves the corners puts these apart.
 fn largest_difference(expected: &[DVec3], got: &[DVec3]) -> f64 {
     assert!(expected.iter().any(|pixel| pixel.max_element() > 0.01), "the frame is black");
-    let of = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().max_element() / (a.abs().max_element() + 0.01);
-    expected.iter().zip(got).map(of).fold(0.0, f64::max)
+    let allowed = apart_by_moved_corners(expected, SIZE.0 as usize);
+    let of = |((a, b), allowed): ((&DVec3, &DVec3), f64)| {
+        ((*a - *b).abs().max_element() - allowed).max(0.0) / (a.abs().max_element() + 0.01)
+    };
+    expected.iter().zip(got).zip(allowed).map(of).fold(0.0, f64::max)
 }
 
 /// Returns the difference of both paths, and the report of the deferred frame.
@@ -201,7 +207,7 @@ fn baked_light_shadows_fog_and_backs_are_the_same() {
     world.insert_resource(SceneSettings { fog: Some(fog), two_sided: true, ..SceneSettings::default() });
     let (apart, report) = difference(&mut world, &by(RenderingPath::Deferred));
     println!("{apart:.1e}");
-    assert!(apart < ROUNDING, "{apart}");
+    assert!(apart < ROUNDING + filter_step(), "{apart}");
     assert!(report.plan.status("shadow maps").unwrap().runs());
     // Nothing in this frame had to be drawn forward.
     assert_eq!(report.statistics.lit_passes, Default::default());
@@ -313,7 +319,7 @@ fn more_lightmaps_than_classes_are_all_shown() {
     }
     let (apart, report) = difference(&mut world, &by(RenderingPath::Deferred));
     println!("{apart:.1e}, {} draws", report.statistics.draws);
-    assert!(apart < ROUNDING, "{apart}");
+    assert!(apart < ROUNDING + filter_step(), "{apart}");
 }
 
 #[test]
@@ -329,17 +335,19 @@ fn a_light_that_is_left_out_is_missed() {
 }
 
 #[test]
-fn automatic_is_deferred_where_software_draws_many_lights() {
+fn automatic_is_deferred_under_many_lights() {
     let mut world = room(perspective());
     let far = Transform::from_xyz(0.0, 90.0, 0.0);
+    // With the room's own lamps enough for the device.
+    let number = if gpu().is_software() { 60 } else { 1020 };
     let lamps: Vec<Entity> =
-        (0..60).map(|_| world.spawn((Light::point(Vec3::ONE).with_range(4.0), far)).id()).collect();
+        (0..number).map(|_| world.spawn((Light::point(Vec3::ONE).with_range(4.0), far)).id()).collect();
     let runs = |world: &mut World, options: &FrameOptions| {
         let (_, report) = draw(world, 40, 30, options);
         report.plan.status("g-buffer").unwrap().runs()
     };
     let auto = by(RenderingPath::Auto);
-    assert_eq!(runs(&mut world, &auto), gpu().is_software());
+    assert!(runs(&mut world, &auto));
     assert!(!runs(&mut world, &FrameOptions { light_lists: LightLists::Objects, ..auto.clone() }));
     assert!(!runs(&mut world, &FrameOptions { multisample: Some(true), ..auto.clone() }));
     assert!(!runs(&mut world, &FrameOptions { shading: Some(Shading::Gouraud), ..auto.clone() }));
@@ -352,11 +360,13 @@ fn automatic_is_deferred_where_software_draws_many_lights() {
     // The plan without a frame agrees with that of the frame.
     let explained = Renderer::new(gpu()).explain(&mut world, &auto, 40, 30).unwrap();
     let pass = explained.frame.passes.iter().find(|pass| pass.name == "g-buffer").unwrap();
-    assert_eq!(pass.group.is_some(), gpu().is_software());
+    assert!(pass.group.is_some());
     let path = |explained: lumbre_render::SceneExplanation| explained.rendering_path;
-    assert_eq!(path(explained).starts_with("deferred"), gpu().is_software());
-    let without_a_device = lumbre_render::explain(&mut world, &auto, 40, 30).unwrap();
-    assert!(path(without_a_device).contains("deferred where a processor draws"));
+    assert!(path(explained).starts_with("deferred"));
+    // Without a device that of a GPU.
+    let without_a_device = path(lumbre_render::explain(&mut world, &auto, 40, 30).unwrap());
+    let expected = if gpu().is_software() { "and a GPU gains from 1024 on" } else { "deferred: a GPU draws" };
+    assert!(without_a_device.contains(expected), "{without_a_device}");
     // With fewer lights a G-buffer is not worthwhile.
     lamps.into_iter().for_each(|lamp| assert!(world.despawn(lamp)));
     assert!(!runs(&mut world, &auto));

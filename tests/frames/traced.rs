@@ -39,6 +39,8 @@ fn against_the_frame(world: &mut World, reflection: Option<ReflectionModel>) -> 
     let inside = twin::draw(world, SIZE as usize, SIZE as usize, twin).inside_surfaces(false);
     let options = FrameOptions { shading: Some(Shading::Phong), reflection, ..linear() };
     let (frame, _) = draw(world, SIZE, SIZE, &options);
+    let moved = twin::by_moved_corners(world, SIZE as usize, SIZE as usize, twin, f64::INFINITY);
+    let frame: Vec<DVec3> = frame.iter().zip(moved).map(|(frame, moved)| *frame - moved).collect();
     let picture = traced(world, reflection);
     let masked = |pixels: &[DVec3]| -> Vec<Option<DVec3>> {
         pixels.iter().zip(&inside).map(|(pixel, inside)| inside.map(|_| *pixel)).collect()

@@ -19,6 +19,7 @@
 //! ```
 
 pub mod compare;
+pub mod device;
 pub mod kernel;
 pub mod panes;
 pub mod running_error;

@@ -29,14 +29,8 @@ mod worst_inputs;
 use std::sync::OnceLock;
 
 use judge::Twin;
-use lumbre_render::Gpu;
+use lumbre_tests::device::gpu;
 use verdict::{HEADING, LEGEND};
-
-/// The device of all tests in this target.
-fn gpu() -> &'static Gpu {
-    static GPU: OnceLock<Gpu> = OnceLock::new();
-    GPU.get_or_init(|| Gpu::headless().unwrap_or_else(|error| panic!("{error}")))
-}
 
 /// The twins of all functions.
 fn all() -> &'static [Twin] {

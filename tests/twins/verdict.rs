@@ -102,8 +102,8 @@ abs, ULP: largest error, the latter in f32 units of the expected value where tha
 bound: largest error over the bound that the twin's documentation states. machine: largest error over the running error found from the
 shader itself, on one input of 64. reach: largest error that any WGSL device may make, by that running error, over the stated bound;
 at most 1 where the machine proves the bound, more where the bound uses that errors cancel. open: inputs within rounding of a
-condition (n.l > 0, a cutoff, total reflection), where either side's value is accepted, random / hard; crossed: how many of them the
-device put on the other side. wild: inputs of any size with a result that is not finite or out of range. Nothing is left out.";
+condition (n.l > 0, a cutoff, total reflection), where either side's value is accepted, random / hard; crossed: how many inputs the
+device put there, or answered as if their subnormal numbers were 0. wild: inputs of any size with a result that is not finite or out of range. Nothing is left out.";
 
 /// The heading of the table.
 pub const HEADING: &str = "function                                     random    hard      abs random/hard       ULP random/hard  \

@@ -11,6 +11,9 @@ use crate::power::power_of_cosine;
 
 /// Smallest exponent that is divided by; far above it, β has already reached 90 degrees.
 const SMALLEST_EXPONENT: f64 = 1e-6;
+/// Largest exponent that is told from larger ones. Beyond it, sin² β would be a subnormal f32, which devices may flush
+/// to 0.
+const LARGEST_EXPONENT: f64 = 1e30;
 
 /// Returns sin² β = 1 - 4^(-1/n), the squared sine of the angle at which cosⁿ is a half.
 ///
@@ -21,7 +24,7 @@ const SMALLEST_EXPONENT: f64 = 1e-6;
 /// With x = 2 ln 2/n, off by 7 u, the error is 7 u x e⁻ˣ, plus, up to x = 1/4, that of a series good to 10⁻⁸ and 7
 /// u of itself, and beyond it exp's 2 u (3 + 2 x) e⁻ˣ and u. At most 32 u relative, just beyond 1/4.
 pub fn half_value_sine_squared(shininess: f64) -> f64 {
-    -(-2.0 * LN_2 / shininess.max(SMALLEST_EXPONENT)).exp_m1()
+    -(-2.0 * LN_2 / shininess.clamp(SMALLEST_EXPONENT, LARGEST_EXPONENT)).exp_m1()
 }
 
 /// Returns β in radians, from 0 to π/2: the angle at which the highlight of the exponent `shininess` falls to a
@@ -33,7 +36,7 @@ pub fn half_value_sine_squared(shininess: f64) -> f64 {
 /// its cosine (7 u ln 2/n, and exp's), plus 9 u of the angle: about 20 u.
 pub fn half_value_angle(shininess: f64) -> f64 {
     // The cosine is computed separately, as 2^(-1/n): 1 - sin² has lost its digits where the angle is large.
-    let cosine = (-LN_2 / shininess.max(SMALLEST_EXPONENT)).exp();
+    let cosine = (-LN_2 / shininess.clamp(SMALLEST_EXPONENT, LARGEST_EXPONENT)).exp();
     quarter_angle(half_value_sine_squared(shininess).sqrt(), cosine)
 }
 

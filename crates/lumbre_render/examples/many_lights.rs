@@ -123,7 +123,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let ([changed, _], changed_cpu, _) = drawn(&mut world, &options, true)?;
         let ([kept, _], kept_cpu, _) = drawn(&mut world, &kept, false)?;
         println!(
-            "{number}, {still:.1}, {least:.1}, {changed:.1}, {kept:.4}, {still_cpu:.3}, {changed_cpu:.3}, {kept_cpu:.4}"
+            "{number}, {still:.2}, {least:.2}, {changed:.2}, {kept:.4}, {still_cpu:.3}, {changed_cpu:.3}, {kept_cpu:.4}"
         );
         if account {
             let measured = |measure| FrameOptions { measure, ..options.clone() };

@@ -87,10 +87,10 @@ pub enum LightLists {
 /// The picture is the same up to rounding, except where a forward-lit and a deferred surface are coplanar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum RenderingPath {
-    /// Deferred on a software rasterizer if many lights meet small triangles: with at least 64 lights that
-    /// fragments find by clusters, at least one triangle for every 16 pixels of the frame, and no lightmaps.
-    /// Otherwise forward. A software rasterizer shades whole blocks of pixels for each triangle, and a small
-    /// triangle fills little of a block.
+    /// Deferred if many lights meet small triangles and no lightmaps: on a software rasterizer with at least 64
+    /// lights that fragments find by clusters and one triangle for every 16 pixels of the frame, on a GPU with
+    /// 1024 lights and a triangle for every 32 pixels. Otherwise forward. Whole blocks of pixels are shaded for
+    /// each triangle, and a small triangle fills little of a block.
     #[default]
     Auto,
     /// Each surface is lit while it is drawn.

@@ -12,9 +12,14 @@ use crate::{FrameOptions, RenderingPath};
 /// With at least this many lights with a range, a software rasterizer gains by deferred shading. With fewer,
 /// drawing the G-buffer costs about what it saves.
 const ENOUGH_LIGHTS: u32 = 64;
+/// The same of a GPU. An NVIDIA H100 draws 64 balls of 73,000 triangles at 1920 x 1080 under 1024 lights in 0.91 and
+/// under 10,000 in 0.64 of the time of forward shading.
+const ENOUGH_LIGHTS_ON_A_GPU: u32 = 1024;
 /// Most pixels of the frame per triangle of the scene at which it gains. Blocks of 16 pixels are shaded for
 /// each triangle, and larger triangles fill them.
 const MAX_PIXELS: u64 = 16;
+/// The same of a GPU, which shades blocks of four pixels but also spreads the work of all triangles evenly.
+const MAX_PIXELS_ON_A_GPU: u64 = 32;
 
 /// The rendering path of a frame, by the reason for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,12 +32,12 @@ pub(crate) enum ChosenPath {
     /// empty.
     NotDeferrable,
     /// The light loop is short.
-    FewLights(u32),
+    FewLights { lights: u32, software: bool },
     /// The triangles of the scene are large in a frame with this many pixels.
-    LargeTriangles { triangles: usize, pixels: u64 },
+    LargeTriangles { triangles: usize, pixels: u64, most: u64 },
     /// This many objects have lightmaps, each of which would have to be lit separately.
     Lightmaps(usize),
-    /// Small triangles under many lights: deferred on a software rasterizer.
+    /// Small triangles under many lights: deferred.
     ManyLights { lights: u32, triangles: usize, software: bool },
 }
 
@@ -53,14 +58,18 @@ impl ChosenPath {
             true => lights.inverse_square.all + lights.ranged.all,
             false => 0,
         };
+        let (enough, most) = match software {
+            true => (ENOUGH_LIGHTS, MAX_PIXELS),
+            false => (ENOUGH_LIGHTS_ON_A_GPU, MAX_PIXELS_ON_A_GPU),
+        };
         match options.rendering_path {
             RenderingPath::Forward => Self::Asked(RenderingPath::Forward),
             _ if samples > 1 => Self::SeveralSamples,
             RenderingPath::Deferred => Self::Asked(RenderingPath::Deferred),
             RenderingPath::Auto if !lit_by_pixel => Self::NotDeferrable,
-            RenderingPath::Auto if clustered < ENOUGH_LIGHTS => Self::FewLights(clustered),
-            RenderingPath::Auto if pixels > MAX_PIXELS * triangles as u64 => {
-                Self::LargeTriangles { triangles, pixels }
+            RenderingPath::Auto if clustered < enough => Self::FewLights { lights: clustered, software },
+            RenderingPath::Auto if pixels > most * triangles as u64 => {
+                Self::LargeTriangles { triangles, pixels, most }
             }
             RenderingPath::Auto if options.lightmaps && lightmapped > 0 => Self::Lightmaps(lightmapped),
             RenderingPath::Auto => Self::ManyLights { lights: clustered, triangles, software },
@@ -68,7 +77,7 @@ impl ChosenPath {
     }
 
     pub fn is_deferred(self) -> bool {
-        matches!(self, Self::Asked(RenderingPath::Deferred) | Self::ManyLights { software: true, .. })
+        matches!(self, Self::Asked(RenderingPath::Deferred) | Self::ManyLights { .. })
     }
 }
 
@@ -80,12 +89,19 @@ impl Display for ChosenPath {
             Self::NotDeferrable => {
                 write!(out, "forward: surfaces are lit at vertices, or highlights are filtered within pixels")
             }
-            Self::FewLights(lights) => {
-                write!(out, "forward: fragments find {lights} lights by clusters, fewer than {ENOUGH_LIGHTS}")
+            Self::FewLights { lights, software } => {
+                let (who, enough) = match software {
+                    true => ("a processor", ENOUGH_LIGHTS),
+                    false => ("a GPU", ENOUGH_LIGHTS_ON_A_GPU),
+                };
+                write!(
+                    out,
+                    "forward: fragments find {lights} lights by clusters, and {who} gains from {enough} on"
+                )
             }
-            Self::LargeTriangles { triangles, pixels } => write!(
+            Self::LargeTriangles { triangles, pixels, most } => write!(
                 out,
-                "forward: {triangles} triangles are less than one for every {MAX_PIXELS} of the frame's {pixels} pixels"
+                "forward: {triangles} triangles are less than one for every {most} of the frame's {pixels} pixels"
             ),
             Self::Lightmaps(objects) => {
                 write!(out, "forward: {objects} objects have lightmaps, and each map would be lit apart")
@@ -96,7 +112,7 @@ impl Display for ChosenPath {
             ),
             Self::ManyLights { lights, triangles, software: false } => write!(
                 out,
-                "forward on a GPU; deferred where a processor draws: fragments of {triangles} triangles find {lights} lights by clusters"
+                "deferred: a GPU draws {triangles} triangles, whose fragments find {lights} lights by clusters"
             ),
         }
     }

@@ -503,8 +503,16 @@ fn math(function: MathFunction, a: &[Number], b: &[Number], c: &[Number]) -> Sca
         MathFunction::Pow => broadcast(a, b, Number::power),
         MathFunction::Atan2 => broadcast(a, b, Number::arc_tangent_2),
         MathFunction::Mix => {
+            // Devices compute either x (1 - t) + y t or x + t (y - x), which differ in what they round.
             let rest = broadcast(c, &[one], |t, one| one.subtract(t));
-            broadcast(&broadcast(a, &rest, Number::multiply), &broadcast(b, c, Number::multiply), Number::add)
+            let of_both = broadcast(
+                &broadcast(a, &rest, Number::multiply),
+                &broadcast(b, c, Number::multiply),
+                Number::add,
+            );
+            let change = broadcast(c, &broadcast(b, a, Number::subtract), Number::multiply);
+            let from_first = broadcast(a, &change, Number::add);
+            broadcast(&of_both, &from_first, |one, other| Number { error: one.error.max(other.error), ..one })
         }
         other => panic!("lighting functions have no {other:?}"),
     }

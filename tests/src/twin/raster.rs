@@ -18,7 +18,7 @@ use super::{TwinFrame, TwinOptions};
 /// If that is not a perspective camera.
 pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions) -> TwinFrame {
     let view = View::new(world, width, height, options);
-    let surface = view.surfaces();
+    let (surface, uncertain) = view.surfaces();
     let shade = |at: usize, (object, triangle): (usize, usize)| -> Option<DVec3> {
         let (object, triangle) = (&view.objects[object], &view.objects[object].triangles[triangle]);
         let seen = SeenTriangle::new(&view.lens, triangle)?;
@@ -39,7 +39,29 @@ pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions
             *color = lit;
         }
     });
-    TwinFrame { width, height, color, surface }
+    TwinFrame { width, height, color, surface, uncertain }
+}
+
+/// Returns how much lighter each pixel becomes because the tests' device moves the corners of triangles
+/// ([`TwinOptions::subpixel_bits`]), up to `most`, where its display clamps: what a frame of that device differs by
+/// from a picture of a program that does not.
+///
+/// # Panics
+/// As [`draw`].
+pub fn by_moved_corners(
+    world: &mut World,
+    width: usize,
+    height: usize,
+    options: TwinOptions,
+    most: f64,
+) -> Vec<DVec3> {
+    if options.subpixel_bits.is_none() {
+        return vec![DVec3::ZERO; width * height];
+    }
+    let exact = draw(world, width, height, TwinOptions { subpixel_bits: None, ..options });
+    let moved = draw(world, width, height, options);
+    let most = DVec3::splat(most);
+    moved.color.iter().zip(&exact.color).map(|(moved, exact)| moved.min(most) - exact.min(most)).collect()
 }
 
 /// Returns how much every light except ambient ones reflects towards `world`'s first camera, per pixel: the
@@ -62,7 +84,7 @@ pub fn reflected_by_pixel(
         let weights = seen.weights(center(at % width, at / width));
         Some(ShadedTriangle::new(&view.scene, object, triangle, seen.front).reflected(weights))
     };
-    view.surfaces().iter().enumerate().map(|pixel| of_pixel(pixel).unwrap_or_default()).collect()
+    view.surfaces().0.iter().enumerate().map(|pixel| of_pixel(pixel).unwrap_or_default()).collect()
 }
 
 /// Returns the same per corner of every triangle, visible or not, where flat and Gouraud shading evaluate lights.
@@ -117,14 +139,17 @@ impl View {
             size: DVec2::new(width as f64, height as f64),
             to_view: basis.transpose(),
             eye,
+            subpixel_bits: options.subpixel_bits,
         };
         Self { scene, objects, lens }
     }
 
-    /// Returns the object and triangle that each pixel shows.
-    fn surfaces(&self) -> Vec<Option<(usize, usize)>> {
+    /// Returns the object and triangle that each pixel shows, and whether that triangle may have been drawn
+    /// elsewhere.
+    fn surfaces(&self) -> (Vec<Option<(usize, usize)>>, Vec<bool>) {
         let (width, height) = (self.lens.size.x as usize, self.lens.size.y as usize);
         let mut surface = vec![None; width * height];
+        let mut uncertain = vec![false; width * height];
         let mut nearest = vec![f64::INFINITY; width * height];
         for (index, object) in self.objects.iter().enumerate() {
             for (number, triangle) in object.triangles.iter().enumerate() {
@@ -141,12 +166,13 @@ impl View {
                         if depth < nearest[at] {
                             nearest[at] = depth;
                             surface[at] = Some((index, number));
+                            uncertain[at] = seen.uncertain;
                         }
                     }
                 }
             }
         }
-        surface
+        (surface, uncertain)
     }
 }
 
@@ -162,6 +188,22 @@ struct Lens {
     size: DVec2,
     to_view: DMat3,
     eye: DVec3,
+    /// See [`TwinOptions::subpixel_bits`].
+    subpixel_bits: Option<u32>,
+}
+
+impl Lens {
+    /// Returns the place to which a rasterizer moves a vertex, in pixels, and whether rounding in f32 could have it
+    /// moved to another one.
+    fn moved(&self, pixel: DVec2) -> (DVec2, bool) {
+        let Some(bits) = self.subpixel_bits else { return (pixel, false) };
+        // The projection and the viewport transform take three roundings, of values up to the frame's size.
+        let rounding = self.size * 1.5 * f64::from(f32::EPSILON);
+        let steps = f64::from(1_u32 << bits);
+        let moved = (pixel * steps).round() / steps;
+        let from_middle = 0.5 / steps - (moved - pixel).abs();
+        (moved, from_middle.cmplt(rounding).any())
+    }
 }
 
 /// A triangle projected into the frame.
@@ -173,6 +215,8 @@ struct SeenTriangle {
     /// Twice the signed area in pixels.
     area: f64,
     front: bool,
+    /// Whether a rasterizer may move a corner to another place than `pixel` says.
+    uncertain: bool,
 }
 
 impl SeenTriangle {
@@ -184,13 +228,16 @@ impl SeenTriangle {
             return None;
         }
         let aspect = lens.size.x / lens.size.y;
-        let pixel = view.map(|v| {
+        let moved = view.map(|v| {
             let (x, y) = (lens.focal * v.x / (aspect * -v.z), lens.focal * v.y / -v.z);
-            DVec2::new((x + 1.0) * 0.5, (1.0 - y) * 0.5) * lens.size
+            lens.moved(DVec2::new((x + 1.0) * 0.5, (1.0 - y) * 0.5) * lens.size)
         });
+        let (pixel, uncertain) =
+            (moved.map(|(pixel, _)| pixel), moved.iter().any(|(_, uncertain)| *uncertain));
         let area = (pixel[1] - pixel[0]).perp_dot(pixel[2] - pixel[0]);
         // With y pointing down, counter-clockwise in the world is a negative area here.
-        (area != 0.0).then(|| Self { pixel, depth: view.map(|v| -v.z), area, front: area < 0.0 })
+        let depth = view.map(|v| -v.z);
+        (area != 0.0).then_some(Self { pixel, depth, area, front: area < 0.0, uncertain })
     }
 
     /// Returns the screen-space weights, each divided by its corner's distance, for perspective-correct

@@ -55,7 +55,7 @@ pub fn fog_exponential_squared(density: f64, distance: f64) -> f64 {
 /// fog_depth_cue: 7 u of the fraction f times the difference of the weights, then 2 u of the near part, u of the
 /// far one, and the sum's u.
 pub fn fog_depth_cue(start: f64, end: f64, near_weight: f64, far_weight: f64, distance: f64) -> Allowed {
-    let far = 1.0 - lumbre_optics::fog_linear(start, end, distance);
+    let far = lumbre_optics::fog_fraction(start, end, limited(distance));
     let of_fraction = fraction(start, end, distance, far);
     let (near_part, far_part) = ((near_weight * (1.0 - far)).abs(), (far_weight * far).abs());
     let error = (near_weight - far_weight).abs() * of_fraction
