@@ -16,7 +16,7 @@ use lumbre_scene::Transform;
 use crate::compile_ahead::{Begun, Drawing, compile_ahead};
 use crate::frame::{Frame, counting_options, picture_options};
 use crate::picture::Picture;
-use crate::rounds::{Work, in_rounds, milliseconds_since, warm_up};
+use crate::rounds::{Rounds, Work, in_rounds, milliseconds_since, warm_up};
 use crate::{Conditions, CostError, Spread};
 
 /// Distance in metres by which lamps move, and angle in radians by which directional lights turn.
@@ -72,6 +72,19 @@ pub fn draw_frames(
     conditions: &Conditions<'_>,
     frames: Vec<Frame>,
     seconds: f64,
+    told: [f64; 2],
+) -> Result<Vec<DrawnFrame>, CostError> {
+    draw_in_rounds(conditions, frames, conditions.rounds(seconds), told)
+}
+
+/// Does what [`draw_frames`] does, in these rounds.
+///
+/// # Errors
+/// [`CostError::Render`], [`CostError::Interrupted`].
+pub fn draw_in_rounds(
+    conditions: &Conditions<'_>,
+    frames: Vec<Frame>,
+    rounds: Rounds,
     [before, after]: [f64; 2],
 ) -> Result<Vec<DrawnFrame>, CostError> {
     let renderers = renderers(conditions, &frames);
@@ -80,7 +93,6 @@ pub fn draw_frames(
     let target = Offscreen::new(conditions.gpu, width, height, format)?;
     let timed_target = target.target();
     let part = |share: f64| before + share * (after - before);
-    let rounds = conditions.rounds(seconds);
     let timed = |frame| timed_work(conditions, frame, &renderers, &timed_target);
     let mut work: Vec<Work<'_>> =
         frames.iter().zip(0..).map(|(frame, number)| timed((frame, number))).collect();

@@ -76,4 +76,4 @@ pub use report::{
 pub use run::{CostOptions, CostProgress, measure};
 pub use spread::Spread;
 pub use studies::{STUDIES, StudyKind, studies_named};
-pub use tune::{DrawSettings, Goal, TuneOptions, Tuned, tune};
+pub use tune::{DrawSettings, Goal, LIGHTMAP_BYTES, TuneOptions, Tuned, tune};
