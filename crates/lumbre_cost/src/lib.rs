@@ -27,6 +27,7 @@
 //! assert!(changes.iter().any(|change| change.is_slower()));
 //! ```
 
+mod all_pairs;
 mod baked;
 mod clustered_mesh;
 mod command_line;

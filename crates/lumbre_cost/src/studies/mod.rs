@@ -2,6 +2,7 @@
 //! findings.
 
 mod bake;
+mod documents;
 mod effects;
 mod lamps;
 mod light_transport;
@@ -96,6 +97,12 @@ pub const STUDIES: &[StudyKind] = &[
         about: "f32 on the device, compared with f64",
         method: 3,
         run: precision::run,
+    },
+    StudyKind {
+        name: "documents",
+        about: "what the documents say about cost, where no other study measures it",
+        method: 1,
+        run: documents::run,
     },
 ];
 
