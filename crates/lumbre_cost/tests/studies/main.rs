@@ -5,6 +5,7 @@
 
 mod changed;
 mod counts;
+mod documents;
 mod kept_pictures;
 mod live;
 mod planted;
