@@ -20,6 +20,8 @@ pub struct Frame {
     /// Whether every lamp that casts shadows moves slightly, alternately to and fro, before each timed frame,
     /// so that no shadow map can be reused.
     pub moving_lamps: bool,
+    /// Whether the frame is timed, or drawn for its picture and its counts only.
+    pub is_timed: bool,
     /// Settings that the scene gets before each drawing, so that frames with different settings can share it.
     settings: Option<SceneSettings>,
 }
@@ -32,7 +34,14 @@ impl Frame {
 
     /// Creates a frame of a scene that other frames show too.
     pub fn of(world: &Arc<Mutex<World>>, options: FrameOptions) -> Self {
-        Self { world: Arc::clone(world), options, renderer: None, moving_lamps: false, settings: None }
+        Self {
+            world: Arc::clone(world),
+            options,
+            renderer: None,
+            moving_lamps: false,
+            is_timed: true,
+            settings: None,
+        }
     }
 
     /// Locks the scene, which then has the frame's settings.
@@ -50,6 +59,11 @@ impl Frame {
     /// Returns the frame with a renderer shared by all frames with this name.
     pub fn sharing(self, renderer: &'static str) -> Self {
         Self { renderer: Some(renderer), ..self }
+    }
+
+    /// Returns the frame, timed or not.
+    pub fn timed(self, is_timed: bool) -> Self {
+        Self { is_timed, ..self }
     }
 
     /// Returns the frame with these settings of its scene.

@@ -66,7 +66,7 @@ pub const STUDIES: &[StudyKind] = &[
         method: 3,
         run: effects::run,
     },
-    StudyKind { name: "bake", about: "bakes over the requested error", method: 2, run: bake::run },
+    StudyKind { name: "bake", about: "bakes over the requested error", method: 3, run: bake::run },
     StudyKind {
         name: "preprocessing",
         about: "interreflected light, baked before the game",

@@ -129,6 +129,9 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
 
     let mut measured = Measured { study: study(&scene.name), ..Measured::default() };
     let mut found = Candidates::default();
+    // Once it is known at which cameras frames take longest, stages are timed there alone.
+    let every = vec![true; cameras.len()];
+    let mut slow = every.clone();
     let stages = Stage::ALL.len() as f64;
     let rounds = conditions.rounds(SECONDS[0] / stages);
     // What a stage drops is not chosen any more, and what it keeps is measured again: the fewest rounds that tell
@@ -140,8 +143,10 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
         let ways = found.next(stage, &choices);
         if ways.len() > 1 {
             let told = [share(place), share(place + 1)];
-            let drawn = draw_at_cameras(conditions, &mut worlds, &cameras, &ways, rounds_of_stage, told)?;
+            let drawn =
+                draw_at_cameras(conditions, &mut worlds, (&cameras, &slow), &ways, rounds_of_stage, told)?;
             if found.settings.is_empty() {
+                slow = slowest(&drawn, cameras.len());
                 for (number, ((_, name), exact)) in cameras.iter().zip(drawn.iter().flatten()).enumerate() {
                     measured.keep_reference(&reference_name(number, name), exact.picture.clone());
                 }
@@ -158,8 +163,14 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     let ways: Vec<DrawSettings> = found.contenders().iter().map(|&one| found.settings[one]).collect();
     let sizes = |way: &DrawSettings| lightmaps.bytes(way.lightmap_reduction);
     let mut measure = |ways: &[DrawSettings], found: &mut Candidates, told: [f64; 2]| {
-        let drawn =
-            draw_at_cameras(conditions, &mut worlds, &cameras, ways, conditions.rounds(SECONDS[1]), told)?;
+        let drawn = draw_at_cameras(
+            conditions,
+            &mut worlds,
+            (&cameras, &every),
+            ways,
+            conditions.rounds(SECONDS[1]),
+            told,
+        )?;
         found.begin();
         for (way, drawn) in ways.iter().zip(&drawn) {
             found.take(*way, longest(drawn), |label| {
@@ -201,6 +212,19 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     study.findings = findings(&study.points, &front, chosen, goal, cameras.len());
     study.findings.extend(of_lightmaps);
     Ok(Tuned { study, settings, front, chosen, pictures: measured })
+}
+
+/// Returns for each camera whether frames there may be the slowest with some of these settings: where their range
+/// of times is not below that of the slowest camera.
+fn slowest(drawn: &[Vec<DrawnFrame>], cameras: usize) -> Vec<bool> {
+    let mut slow = vec![false; cameras];
+    for of_way in drawn {
+        let Some(longest) = longest(of_way) else { continue };
+        for (slow, drawn) in slow.iter_mut().zip(of_way) {
+            *slow |= drawn.spread().is_some_and(|spread| !spread.is_below(&longest));
+        }
+    }
+    slow
 }
 
 /// Returns the name of a camera's reference picture.
@@ -252,12 +276,13 @@ impl Worlds<'_> {
     }
 }
 
-/// Draws frames with some settings at every camera, and returns them by settings and camera. `told` are the
+/// Draws frames with some settings at every camera, times those at the cameras for which `timed` says so, and
+/// returns all by settings and camera. `told` are the
 /// fractions that are done before and after.
 fn draw_at_cameras(
     conditions: &Conditions<'_>,
     worlds: &mut Worlds<'_>,
-    cameras: &[(Entity, String)],
+    (cameras, timed): (&[(Entity, String)], &[bool]),
     ways: &[DrawSettings],
     rounds: Rounds,
     told: [f64; 2],
@@ -265,9 +290,10 @@ fn draw_at_cameras(
     let mut frames = Vec::new();
     for settings in ways {
         let (world, own) = worlds.with_lightmaps(settings.lightmap_reduction)?;
-        for (camera, _) in cameras {
+        for ((camera, _), is_timed) in cameras.iter().zip(timed) {
             let options = FrameOptions { camera: Some(*camera), ..FrameOptions::default() };
-            frames.push(Frame::of(&world, options).with_settings(settings.of_scene(own)).sharing("tune"));
+            let frame = Frame::of(&world, options).with_settings(settings.of_scene(own)).sharing("tune");
+            frames.push(frame.timed(*is_timed));
         }
     }
     let mut drawn = draw_in_rounds(conditions, frames, rounds, told)?.into_iter();
