@@ -254,12 +254,13 @@ fn lights_that_come_and_go_and_change() {
     for light in [0, 1, 3] {
         scene.world.get_mut::<Light>(scene.lights[light]).unwrap().attenuation = ranged(4.0);
     }
-    for light_threshold in [0.0, 0.2, 0.0] {
-        let frame = FrameSettings { light_threshold, ..FrameSettings::default() };
+    scene.world.get_mut::<Light>(scene.lights[0]).unwrap().shadow = true;
+    for (light_threshold, shadows) in [(0.0, true), (0.2, true), (0.0, false), (0.0, true)] {
+        let frame = FrameSettings { light_threshold, shadows, ..FrameSettings::default() };
         scene.world.resource_mut::<SceneSettings>().frame = frame;
         let (kept, _) = scene.canvas.draw(&mut scene.world, &linear());
         let (fresh, _) = draw(&mut scene.world, SIZE, SIZE, &linear());
-        assert!(kept == fresh, "a threshold of {light_threshold}");
+        assert!(kept == fresh, "a threshold of {light_threshold}, with shadows: {shadows}");
     }
     // So far away that camera-relative space has its origin at the camera.
     let camera = scene.world.query_filtered::<Entity, With<Camera>>().single(&scene.world).unwrap();

@@ -1,4 +1,4 @@
-//! The settings of a scene for its frames: samples, where lamps end, the filter and resolution of shadow maps. Each
+//! The settings of a scene for its frames: samples, where lamps end, whether shadows are drawn, the filter and resolution of shadow maps. Each
 //! has its effect, and no effect if it is not set.
 
 use bevy_ecs::prelude::*;
@@ -116,6 +116,19 @@ fn shadows_of_a_lamp_without_a_size_are_the_same_soft_or_not_and_a_size_counts_o
         assert_eq!(small[0], small[1]);
         assert_eq!(small[0], large[0], "a lamp's size shows without soft shadows");
         assert_ne!(large[0], large[1]);
+    }
+}
+
+#[test]
+fn shadows_are_drawn_unless_the_scene_leaves_them_out() {
+    for lamp in lamps() {
+        let mut world = ball_and_floor(lamp.clone());
+        let mut dark = |shadows| {
+            let lit = lit(&mut world, FrameSettings { shadows, ..FrameSettings::default() });
+            lit.iter().flatten().filter(|lit| (**lit - 1.0).abs() > 1e-6).count()
+        };
+        assert_eq!(dark(false), 0, "{lamp:?}");
+        assert!(dark(true) > 60, "{lamp:?}: only {} points are in the shadow", dark(true));
     }
 }
 

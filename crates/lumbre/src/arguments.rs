@@ -490,8 +490,8 @@ pub struct Tune {
     /// --frame-ms the fastest settings within it are chosen.
     #[arg(long, value_name = "ERROR", value_parser = share, allow_negative_numbers = true)]
     pub error: Option<f64>,
-    /// File for the level with the chosen settings: its shading, its shadows, where its lamps end, and
-    /// samples per pixel.
+    /// File for the level with the chosen settings: its shading, its shadows, where its lamps end, samples
+    /// per pixel, and its lightmaps, if fewer texels of them do.
     #[arg(short, long, value_name = "OUT.glb", requires = "goal")]
     pub output: Option<PathBuf>,
     /// Folder for a report, as of `lumbre cost`: all settings with picture, time and error.
@@ -574,9 +574,15 @@ pub struct Frame {
     /// Ignore lightmaps.
     #[arg(long)]
     pub no_lightmaps: bool,
+    /// Show lightmaps with N times fewer texels along each side: each is the mean of those it replaces.
+    #[arg(long, value_name = "N", default_value = "1", hide_default_value = true, value_parser = clap::value_parser!(u32).range(1..=64), allow_negative_numbers = true)]
+    pub lightmap_reduction: u32,
     /// Ignore irradiance volumes; moving objects then get the scene's ambient light.
     #[arg(long)]
     pub no_irradiance_volumes: bool,
+    /// Draw the shadows that lights ask for, whatever the file says.
+    #[arg(long, conflicts_with = "no_shadows")]
+    pub shadows: bool,
     /// Draw no shadows: every light reaches everything.
     #[arg(long)]
     pub no_shadows: bool,

@@ -8,7 +8,7 @@ use lumbre::optics::{Light, LightKind};
 use lumbre::render::{Display, FrameOptions, Gpu, meter, removable_effects};
 use lumbre::scene::{
     self, ActiveCamera, Camera, Census, GlobalTransform, LoadOptions, LoadReport, Name, SceneSettings,
-    SourceFile,
+    SourceFile, reduce_lightmaps,
 };
 
 use crate::arguments::{Exposure, Frame, Reading};
@@ -120,8 +120,11 @@ pub fn frame_options(
     }
     let settings = &mut world.get_resource_or_insert_with(SceneSettings::default).frame;
     settings.light_threshold = frame.light_threshold.unwrap_or(settings.light_threshold);
+    let shadows = frame.shadows || frame.every_shadow || settings.shadows;
+    settings.shadows = shadows && !frame.no_shadows;
     settings.shadow_resolution = frame.shadow_resolution.unwrap_or(settings.shadow_resolution);
     settings.shadow_filter = frame.shadow_filter.unwrap_or(settings.shadow_filter);
+    reduce_lightmaps(world, frame.lightmap_reduction);
     if frame.every_shadow {
         let mut lights = world.query::<&mut Light>();
         let lamps = lights.iter_mut(world).filter(|light| light.kind != LightKind::Ambient);

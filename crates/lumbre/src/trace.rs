@@ -145,8 +145,8 @@ fn meaningless(asked: &Trace) -> Vec<&'static str> {
             "--aov standard-error is for --integrator path: the ray tree has no noise, and every pixel of that picture is infinite",
         ),
         (
-            asked.frame.every_shadow || asked.frame.rendering_path.is_some(),
-            "--every-shadow and --rendering-path change nothing: every lamp casts its shadow, and rays have no rendering path",
+            asked.frame.shadows || asked.frame.every_shadow || asked.frame.rendering_path.is_some(),
+            "--shadows, --every-shadow and --rendering-path change nothing: every lamp casts its shadow, and rays have no rendering path",
         ),
         (asked.frame.no_msaa, "--no-msaa changes nothing: --samples says how many samples a pixel has"),
         (!asked.frame.without.is_empty(), "--without is for frames: rays have every effect of the scene"),

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use anyhow::bail;
-use lumbre::cost::{CostError, DrawSettings, Goal, PAGE, TuneOptions, Tuned, tune};
+use lumbre::cost::{CostError, DrawSettings, Goal, LIGHTMAP_BYTES, PAGE, TuneOptions, Tuned, tune};
 use lumbre::render::Gpu;
 use lumbre::scene::{FileSettings, save_settings};
 
@@ -59,13 +59,18 @@ fn print(tuned: &Tuned, asked: &Tune) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     let points = &tuned.study.points;
     let width = points.iter().map(|point| point.label.len()).max().unwrap_or(0);
-    writeln!(out, "{:width$}  {:>10}  {:>9}", "the front", "ms", "error, %")?;
+    let with_lightmaps = points.iter().any(|point| point.counts.contains_key(LIGHTMAP_BYTES));
+    let lightmaps = if with_lightmaps { "  lightmaps, MB" } else { "" };
+    writeln!(out, "{:width$}  {:>10}  {:>9}{lightmaps}", "the front", "ms", "error, %")?;
     for &place in &tuned.front {
         let point = &points[place];
         let (time, error) =
             (point.milliseconds.map_or(f64::NAN, |time| time.median), point.error.unwrap_or_default());
         let mark = if tuned.chosen == Some(place) { " <" } else { "" };
-        writeln!(out, "{:width$}  {time:>10.2}  {:>9.3}{mark}", point.label, 100.0 * error.relative_rmse)?;
+        let bytes = point.counts.get(LIGHTMAP_BYTES);
+        let bytes = bytes.map_or_else(String::new, |bytes| format!("  {:>13.3}", bytes / 1e6));
+        let error = 100.0 * error.relative_rmse;
+        writeln!(out, "{:width$}  {time:>10.2}  {error:>9.3}{bytes}{mark}", point.label)?;
     }
     for line in tuned.study.findings.iter().chain(&tuned.study.notes) {
         writeln!(out, "{line}")?;
@@ -79,10 +84,16 @@ fn print(tuned: &Tuned, asked: &Tune) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes the level with the chosen settings: shading, frame settings, and whether its lights cast shadows.
+/// Writes the level with the chosen settings.
 fn write(settings: &DrawSettings, asked: &Tune, output: &Path) -> anyhow::Result<()> {
-    let DrawSettings { shading, shadows, .. } = *settings;
-    save_settings(&asked.input, output, FileSettings { shading, shadows, frame: settings.frame() })?;
-    eprintln!("lumbre: {} has these settings", output.display());
+    let DrawSettings { shading, lightmap_reduction, .. } = *settings;
+    let settings = FileSettings { shading, frame: settings.frame(), lightmap_reduction };
+    let saved = save_settings(&asked.input, output, settings)?;
+    let bytes: u64 = saved.lightmaps.iter().map(|file| file.bytes).sum();
+    let maps = match saved.lightmaps.len() {
+        0 => String::new(),
+        files => format!(" and smaller lightmaps: {files} files of {:.3} MB in all", bytes as f64 / 1e6),
+    };
+    eprintln!("lumbre: {} has these settings{maps}", output.display());
     Ok(())
 }

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bevy_ecs::world::World;
 use lumbre_render::{Display, FrameOptions, Measure};
+use lumbre_scene::SceneSettings;
 
 /// A scene with the options for drawing a frame of it.
 pub struct Frame {
@@ -19,6 +20,10 @@ pub struct Frame {
     /// Whether every lamp that casts shadows moves slightly, alternately to and fro, before each timed frame,
     /// so that no shadow map can be reused.
     pub moving_lamps: bool,
+    /// Whether the frame is timed, or drawn for its picture and its counts only.
+    pub is_timed: bool,
+    /// Settings that the scene gets before each drawing, so that frames with different settings can share it.
+    settings: Option<SceneSettings>,
 }
 
 impl Frame {
@@ -29,18 +34,41 @@ impl Frame {
 
     /// Creates a frame of a scene that other frames show too.
     pub fn of(world: &Arc<Mutex<World>>, options: FrameOptions) -> Self {
-        Self { world: Arc::clone(world), options, renderer: None, moving_lamps: false }
+        Self {
+            world: Arc::clone(world),
+            options,
+            renderer: None,
+            moving_lamps: false,
+            is_timed: true,
+            settings: None,
+        }
     }
 
-    /// Locks the scene.
+    /// Locks the scene, which then has the frame's settings.
     pub fn world(&self) -> MutexGuard<'_, World> {
         // A thread that panicked was only drawing; the World is intact.
-        self.world.lock().unwrap_or_else(PoisonError::into_inner)
+        let mut world = self.world.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(settings) = self.settings
+            && world.get_resource::<SceneSettings>() != Some(&settings)
+        {
+            world.insert_resource(settings);
+        }
+        world
     }
 
     /// Returns the frame with a renderer shared by all frames with this name.
     pub fn sharing(self, renderer: &'static str) -> Self {
         Self { renderer: Some(renderer), ..self }
+    }
+
+    /// Returns the frame, timed or not.
+    pub fn timed(self, is_timed: bool) -> Self {
+        Self { is_timed, ..self }
+    }
+
+    /// Returns the frame with these settings of its scene.
+    pub fn with_settings(self, settings: SceneSettings) -> Self {
+        Self { settings: Some(settings), ..self }
     }
 
     /// Returns the frame with moving lamps.

@@ -16,7 +16,7 @@ use lumbre_scene::Transform;
 use crate::compile_ahead::{Begun, Drawing, compile_ahead};
 use crate::frame::{Frame, counting_options, picture_options};
 use crate::picture::Picture;
-use crate::rounds::{Work, in_rounds, milliseconds_since, warm_up};
+use crate::rounds::{Rounds, Work, in_rounds, milliseconds_since, warm_up};
 use crate::{Conditions, CostError, Spread};
 
 /// Distance in metres by which lamps move, and angle in radians by which directional lights turn.
@@ -24,7 +24,7 @@ const HAIR: f64 = 1e-4;
 
 /// The measurements of a frame.
 pub struct DrawnFrame {
-    /// Milliseconds of each round, from the call until the device has finished.
+    /// Milliseconds of each round, from the call until the device has finished; empty if it is not timed.
     pub times: Vec<f64>,
     /// Its picture, in 32-bit floats and without exposure.
     pub picture: Picture,
@@ -72,6 +72,19 @@ pub fn draw_frames(
     conditions: &Conditions<'_>,
     frames: Vec<Frame>,
     seconds: f64,
+    told: [f64; 2],
+) -> Result<Vec<DrawnFrame>, CostError> {
+    draw_in_rounds(conditions, frames, conditions.rounds(seconds), told)
+}
+
+/// Does what [`draw_frames`] does, in these rounds.
+///
+/// # Errors
+/// [`CostError::Render`], [`CostError::Interrupted`].
+pub fn draw_in_rounds(
+    conditions: &Conditions<'_>,
+    frames: Vec<Frame>,
+    rounds: Rounds,
     [before, after]: [f64; 2],
 ) -> Result<Vec<DrawnFrame>, CostError> {
     let renderers = renderers(conditions, &frames);
@@ -80,12 +93,14 @@ pub fn draw_frames(
     let target = Offscreen::new(conditions.gpu, width, height, format)?;
     let timed_target = target.target();
     let part = |share: f64| before + share * (after - before);
-    let rounds = conditions.rounds(seconds);
-    let timed = |frame| timed_work(conditions, frame, &renderers, &timed_target);
+    let timed: Vec<(&Frame, usize)> = frames.iter().zip(0..).filter(|(frame, _)| frame.is_timed).collect();
     let mut work: Vec<Work<'_>> =
-        frames.iter().zip(0..).map(|(frame, number)| timed((frame, number))).collect();
+        timed.iter().map(|frame| timed_work(conditions, *frame, &renderers, &timed_target)).collect();
     let mut drawn = while_compiling_ahead(conditions, &frames, |begun| {
         let mut drawn = Vec::new();
+        for number in (0..frames.len()).filter(|number| !frames[*number].is_timed) {
+            begun.begin(number, Drawing::Timed);
+        }
         for (number, frame) in frames.iter().enumerate() {
             conditions.tell(part(0.3 * number as f64 / frames.len() as f64))?;
             begun.begin(number, Drawing::Picture);
@@ -107,18 +122,18 @@ pub fn draw_frames(
             drawn.push(found);
         }
         // Frames that were drawn for their pictures are warm, unless they are timed with other pipelines.
-        let cold = work.iter_mut().zip(&frames).enumerate();
-        let cold = cold.filter(|(_, (_, frame))| conditions.as_shown || frame.renderer.is_none());
-        for (number, (piece, _)) in cold {
-            begun.begin(number, Drawing::Timed);
+        let cold = work.iter_mut().zip(&timed);
+        let cold = cold.filter(|(_, (frame, _))| conditions.as_shown || frame.renderer.is_none());
+        for (piece, (_, number)) in cold {
+            begun.begin(*number, Drawing::Timed);
             warm_up([piece], rounds, &|| conditions.tell(part(0.3)))?;
         }
         Ok(drawn)
     })?;
     let go_on = |share: f64| conditions.tell(part(0.3 + 0.7 * share));
     let times = in_rounds(&mut work, rounds, &go_on)?;
-    for (drawn, times) in drawn.iter_mut().zip(times) {
-        drawn.times = times;
+    for ((_, number), times) in timed.iter().zip(times) {
+        drawn[*number].times = times;
     }
     Ok(drawn)
 }

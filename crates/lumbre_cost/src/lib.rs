@@ -27,6 +27,7 @@
 //! assert!(changes.iter().any(|change| change.is_slower()));
 //! ```
 
+mod all_pairs;
 mod baked;
 mod clustered_mesh;
 mod command_line;
@@ -76,4 +77,4 @@ pub use report::{
 pub use run::{CostOptions, CostProgress, measure};
 pub use spread::Spread;
 pub use studies::{STUDIES, StudyKind, studies_named};
-pub use tune::{DrawSettings, Goal, TuneOptions, Tuned, tune};
+pub use tune::{DrawSettings, Goal, LIGHTMAP_BYTES, TuneOptions, Tuned, tune};

@@ -1,5 +1,5 @@
-//! Quality settings that a level requests for its frames: multisampling, where lights end, and shadow
-//! resolution and filter. They trade quality for speed in the rasterizer only; the baker and the ray tracer
+//! Quality settings that a level requests for its frames: multisampling, where lights end, and whether shadows
+//! are drawn, with their resolution and filter. They trade quality for speed in the rasterizer only; the baker and the ray tracer
 //! do not read them.
 
 /// How frames of a scene are drawn where the program does not decide. The defaults are the most accurate
@@ -12,6 +12,8 @@ pub struct FrameSettings {
     /// distance where the strongest channel of a white surface facing it falls to this radiance, or at its own
     /// range if that is shorter. With 0, lights without a range are unbounded.
     pub light_threshold: f32,
+    /// Whether the lights that cast shadows do so in frames. If false, each of them reaches everything.
+    pub shadows: bool,
     /// Factor on the default side length of a shadow map in texels: 1 makes shadows about as sharp as the
     /// picture, 0.5 halves the texels along each side. Clamped to
     /// [`SHADOW_RESOLUTIONS`](Self::SHADOW_RESOLUTIONS).
@@ -50,6 +52,7 @@ impl Default for FrameSettings {
         Self {
             multisample: None,
             light_threshold: 0.0,
+            shadows: true,
             shadow_resolution: 1.0,
             shadow_filter: ShadowFilter::Soft,
         }

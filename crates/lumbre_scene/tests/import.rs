@@ -508,10 +508,11 @@ fn what_a_level_asks_of_its_frames() {
         file.root["scenes"][0]["extensions"] = json!({"LUMBRE_scene": {"frame": frame}});
         file.load().map(|(world, _)| world.resource::<SceneSettings>().frame)
     };
-    let all = json!({"multisample": true, "lightThreshold": 0.02, "shadowResolution": 0.25, "shadowFilter": "hard"});
+    let all = json!({"multisample": true, "lightThreshold": 0.02, "shadows": false, "shadowResolution": 0.25, "shadowFilter": "hard"});
     let expected = FrameSettings {
         multisample: Some(true),
         light_threshold: 0.02,
+        shadows: false,
         shadow_resolution: 0.25,
         shadow_filter: ShadowFilter::Hard,
     };

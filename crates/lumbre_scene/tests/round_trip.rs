@@ -76,6 +76,7 @@ fn everything() -> World {
         frame: FrameSettings {
             multisample: Some(true),
             light_threshold: 0.0625,
+            shadows: false,
             shadow_resolution: 2.0,
             shadow_filter: ShadowFilter::PercentageCloser,
         },

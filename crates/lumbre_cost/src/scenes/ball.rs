@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_mesh::shapes::tetrahedral_sphere;
+use lumbre_mesh::shapes::{tetrahedral_sphere, uv_sphere};
 use lumbre_optics::{Light, Lobe, Material, ReflectionModel, Surface};
 use lumbre_scene::{Camera, Mesh, Name, Projection, Quadric, SceneSettings, Transform};
 
@@ -30,6 +30,13 @@ pub fn ball(ball: Ball) -> World {
     let mut world = surroundings(ball);
     let mesh = Mesh(Arc::new(tetrahedral_sphere(1.0, ball.depth, false)));
     world.spawn((Name::new("ball"), mesh, material(ball)));
+    world
+}
+
+/// Creates the ball as the sphere of document \[M\]'s table 1.1: 33 meridians and 16 rings, 990 triangles.
+pub fn ball_of_table(ball: Ball) -> World {
+    let mut world = surroundings(ball);
+    world.spawn((Name::new("ball"), Mesh(Arc::new(uv_sphere(1.0, 33, 16))), material(ball)));
     world
 }
 

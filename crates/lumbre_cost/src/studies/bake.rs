@@ -3,12 +3,16 @@
 
 use std::collections::BTreeMap;
 
+use bevy_ecs::prelude::*;
+use glam::Vec3;
 use lumbre_bake::{BakeOptions, Quality};
+use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
 
 use super::over_scenes;
 use crate::baked::{
-    bake_arguments, bake_options, bake_scene, maps_of, nothing_to_bake, picture_of_maps, texel_error,
+    Baked, bake_arguments, bake_options, bake_scene, bake_world, maps_of, nothing_to_bake, picture_of_maps,
+    texel_error,
 };
 use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{cheapest_by_error, counted, error_of, percent, rounded, short, times_of};
@@ -30,6 +34,8 @@ pub(super) const REFERENCE_SECONDS: f64 = 1.5;
 /// Sides of patches in texels; the default of this quality is 4.
 const PATCHES: &[f32] = &[16.0, 8.0, 2.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];
+/// The series of the bake in which no surface reflects light.
+const WITHOUT_BOUNCES: &str = "without bounces";
 const PATCH: &str = "texels along a patch";
 const ASKED: &str = "error asked for, %";
 const STATED: &str = "error stated, % of the mean";
@@ -49,7 +55,7 @@ fn study() -> Study {
     Study {
         name: "bake".into(),
         title: "Bakes over the requested error".into(),
-        question: "How much longer does a bake take for a smaller error, how much time does smoothing save, and is the error that a bake states the true one?".into(),
+        question: "How much longer does a bake take for a smaller error, how much time does smoothing save, what do bounces take, and is the error that a bake states the true one?".into(),
         reference: "a converged bake of the same texels with other random numbers and without smoothing, whose own noise is subtracted; errors are relative to its mean".into(),
         plots: vec![
             Plot {
@@ -78,6 +84,8 @@ struct Asked {
     label: String,
     options: BakeOptions,
     more: &'static str,
+    /// Whether surfaces reflect light on each other. If they do not, the lightmaps hold direct light alone.
+    bounces: bool,
 }
 
 fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
@@ -90,21 +98,42 @@ fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
             label: label(error),
             options: BakeOptions { error, ..options },
             more: "",
+            bounces: true,
         });
     }
     let draft = BakeOptions { quality: Quality::Draft, error: errors[0], ..options };
-    all.push(Asked { series: "draft", label: label(errors[0]), options: draft, more: " --quality draft" });
+    all.push(Asked {
+        series: "draft",
+        label: label(errors[0]),
+        options: draft,
+        more: " --quality draft",
+        bounces: true,
+    });
     // With the least requested error, the remaining error is due to the patches.
     let least = errors.last().copied().unwrap_or(options.error);
     for &texels in conditions.unless_quick(PATCHES, FEW_PATCHES) {
         let options = BakeOptions { error: least, patch_texels: Some(texels), ..options };
-        all.push(Asked { series: "patches", label: format!("{texels} texels a side"), options, more: "" });
+        all.push(Asked {
+            series: "patches",
+            label: format!("{texels} texels a side"),
+            options,
+            more: "",
+            bounces: true,
+        });
     }
     // The command line has no option for bakes without smoothing.
     for &error in errors.iter().take(conditions.unless_quick(2, 1)) {
         let options = BakeOptions { error, denoise: false, ..options };
-        all.push(Asked { series: "without smoothing", label: label(error), options, more: "" });
+        all.push(Asked {
+            series: "without smoothing",
+            label: label(error),
+            options,
+            more: "",
+            bounces: true,
+        });
     }
+    let options = BakeOptions { error: least, ..options };
+    all.push(Asked { series: WITHOUT_BOUNCES, label: label(least), options, more: "", bounces: false });
     all
 }
 
@@ -136,7 +165,11 @@ fn of_scene(
     let all = asked(conditions, options);
     let done = repeated(all.len(), conditions.repetitions(), |place, [from, to]| {
         let told = [from, to].map(|share| part(0.4 + 0.6 * share));
-        let baked = bake_scene(conditions, scene, &all[place].options, told)?;
+        let asked = &all[place];
+        let baked = match asked.bounces {
+            true => bake_scene(conditions, scene, &asked.options, told)?,
+            false => bake_without_bounces(conditions, scene, &asked.options, told)?,
+        };
         Ok((1e3 * baked.report.seconds, baked))
     })?;
     let first = measured.study.points.len();
@@ -172,6 +205,34 @@ fn of_scene(
     Ok(())
 }
 
+/// Bakes a scene whose surfaces reflect nothing while it is baked. A lightmap holds the light that arrives, so that
+/// each surface still gets its direct light.
+fn bake_without_bounces(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    options: &BakeOptions,
+    told: [f64; 2],
+) -> Result<Baked, CostError> {
+    let mut world = scene.open(conditions.aspect())?;
+    let mut materials = world.query::<(Entity, &mut Material)>();
+    let mut own: Vec<(Entity, Material)> = Vec::new();
+    for (entity, mut material) in materials.iter_mut(&mut world) {
+        own.push((entity, material.clone()));
+        let material = &mut *material;
+        for surface in std::iter::once(&mut material.front).chain(&mut material.back) {
+            (surface.ambient, surface.diffuse, surface.specular) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        }
+        material.mirror = Vec3::ZERO;
+    }
+    let (mut baked, _) = bake_world(conditions, world, options, None, told)?;
+    for (entity, material) in own {
+        if let Ok(mut entity) = baked.world.get_entity_mut(entity) {
+            entity.insert(material);
+        }
+    }
+    Ok(baked)
+}
+
 fn parameters(asked: &Asked) -> BTreeMap<String, f64> {
     let error = (ASKED.to_owned(), 100.0 * asked.options.error);
     let patch = asked.options.patch_texels.map(|texels| (PATCH.to_owned(), f64::from(texels)));
@@ -179,7 +240,8 @@ fn parameters(asked: &Asked) -> BTreeMap<String, f64> {
 }
 
 fn command(conditions: &Conditions<'_>, scene: &SceneFile, asked: &Asked) -> String {
-    if !asked.options.denoise {
+    // The command line has no option for these either.
+    if !(asked.options.denoise && asked.bounces) {
         return conditions.again("bake");
     }
     let arguments = bake_arguments(&asked.options);
@@ -188,8 +250,9 @@ fn command(conditions: &Conditions<'_>, scene: &SceneFile, asked: &Asked) -> Str
 
 fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
     let mut findings = Vec::new();
-    let ratios: Vec<f64> = points
-        .iter()
+    // A bake without bounces states the error of direct light.
+    let whole = points.iter().filter(|point| !point.series.starts_with(WITHOUT_BOUNCES));
+    let ratios: Vec<f64> = whole
         .filter_map(|point| {
             Some(point.figures.get(FOUND)? / point.figures.get(STATED).filter(|stated| **stated > 0.0)?)
         })
@@ -220,7 +283,23 @@ fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
         ));
     }
     findings.extend(of_patches(points));
+    findings.extend(of_bounces(points));
     findings
+}
+
+/// Compares the bake without bounces with that of all of them for the same error.
+fn of_bounces(points: &[&Point]) -> Option<String> {
+    let without = points.iter().find(|point| point.series.starts_with(WITHOUT_BOUNCES))?;
+    let all =
+        points.iter().find(|point| point.series.starts_with("final") && point.label == without.label)?;
+    let (short, long) = (without.milliseconds?, all.milliseconds?);
+    Some(format!(
+        "Without bounces, a bake for {} leaves an error of {} instead of {}, in {}.",
+        without.label,
+        error_of(&without.error?),
+        error_of(&all.error?),
+        times_of(&short, &long)
+    ))
 }
 
 /// Compares the coarsest patches with the finest: their numbers, times and errors.

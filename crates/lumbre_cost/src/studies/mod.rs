@@ -2,6 +2,7 @@
 //! findings.
 
 mod bake;
+mod documents;
 mod effects;
 mod lamps;
 mod light_transport;
@@ -65,7 +66,7 @@ pub const STUDIES: &[StudyKind] = &[
         method: 3,
         run: effects::run,
     },
-    StudyKind { name: "bake", about: "bakes over the requested error", method: 2, run: bake::run },
+    StudyKind { name: "bake", about: "bakes over the requested error", method: 3, run: bake::run },
     StudyKind {
         name: "preprocessing",
         about: "interreflected light, baked before the game",
@@ -96,6 +97,12 @@ pub const STUDIES: &[StudyKind] = &[
         about: "f32 on the device, compared with f64",
         method: 3,
         run: precision::run,
+    },
+    StudyKind {
+        name: "documents",
+        about: "what the documents say about cost, where no other study measures it",
+        method: 1,
+        run: documents::run,
     },
 ];
 

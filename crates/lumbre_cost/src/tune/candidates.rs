@@ -2,6 +2,7 @@
 //! another way beats.
 
 use super::draw_settings::{Choices, DrawSettings, Stage};
+use super::goal::{Goal, choose};
 use crate::{Point, Spread, pareto_front};
 
 /// What is known so far about the ways to draw a level.
@@ -74,6 +75,31 @@ impl Candidates {
         self.points[place].milliseconds = milliseconds;
         self.latest.push(place);
         Ok(())
+    }
+
+    /// Returns the index of a way, or `None` if it was not measured.
+    pub fn place(&self, way: &DrawSettings) -> Option<usize> {
+        self.settings.iter().position(|known| known == way)
+    }
+
+    /// Returns the ways of the last measurement that no other one beats in time and error by their medians,
+    /// from the cheapest to the most accurate.
+    pub fn front(&self) -> Vec<usize> {
+        let points = || self.latest.iter().map(|&place| &self.points[place]);
+        let place =
+            |point: &Point| self.latest.iter().copied().find(|&at| std::ptr::eq(&self.points[at], point));
+        pareto_front(points()).into_iter().filter_map(place).collect()
+    }
+
+    /// Returns the one of these ways that reaches a goal best, if one does.
+    pub fn chosen(&self, among: &[usize], goal: Goal) -> Option<usize> {
+        let points: Vec<Point> = among.iter().map(|&place| self.points[place].clone()).collect();
+        choose(&points, goal).map(|one| among[one])
+    }
+
+    /// Returns the ways of the last measurement.
+    pub fn latest(&self) -> &[usize] {
+        &self.latest
     }
 
     /// Returns those of the last measurement that no other one beats.

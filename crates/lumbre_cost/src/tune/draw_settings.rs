@@ -22,6 +22,8 @@ pub struct DrawSettings {
     pub light_threshold: f32,
     /// Whether four samples per pixel are taken.
     pub multisample: bool,
+    /// How many texels of a lightmap become one along each side; 1 for lightmaps as they are in the file.
+    pub lightmap_reduction: u32,
 }
 
 /// What a level leaves to choose.
@@ -66,6 +68,7 @@ impl DrawSettings {
         shadow_resolution: SHADOWS[0].1,
         light_threshold: 0.0,
         multisample: true,
+        lightmap_reduction: 1,
     };
 
     /// Returns the settings with which a World is drawn with these options, for objects that do not choose
@@ -74,16 +77,17 @@ impl DrawSettings {
         let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
         Self {
             shading: options.shading.unwrap_or(settings.shading),
-            shadows: options.shadows,
+            shadows: options.shadows && settings.frame.shadows,
             shadow_filter: settings.frame.shadow_filter,
             shadow_resolution: settings.frame.shadow_resolution,
             light_threshold: settings.frame.light_threshold,
             multisample: options.multisample.or(settings.frame.multisample).unwrap_or(false),
+            lightmap_reduction: 1,
         }
     }
 
     /// Calls `draw` with a World and options that have these settings, also for objects that choose their own
-    /// shading, and restores the World's settings.
+    /// shading, and restores the World's settings. Lightmaps stay as they are.
     pub(crate) fn drawn<T>(
         &self,
         world: &mut World,
@@ -123,21 +127,32 @@ impl DrawSettings {
             threshold => format!(", lamps to {}", short(f64::from(threshold))),
         };
         let samples = if self.multisample { ", four samples" } else { "" };
-        format!("{}{shadows}{lamps}{samples}", self.shading)
+        let maps = match self.lightmap_reduction {
+            1 => String::new(),
+            reduction => format!(", lightmaps at 1/{reduction}"),
+        };
+        format!("{}{shadows}{lamps}{samples}{maps}", self.shading)
     }
 
     /// Returns the arguments of `lumbre render` for these settings.
     pub fn arguments(&self) -> String {
         let shadows = match self.shadows {
             true => format!(
-                " --shadow-filter {} --shadow-resolution {}",
+                " --shadows --shadow-filter {} --shadow-resolution {}",
                 self.shadow_filter.name(),
                 self.shadow_resolution
             ),
             false => " --no-shadows".to_owned(),
         };
         let samples = if self.multisample { " --msaa" } else { " --no-msaa" };
-        format!("--shading {}{shadows} --light-threshold {}{samples}", self.shading, self.light_threshold)
+        let maps = match self.lightmap_reduction {
+            1 => String::new(),
+            reduction => format!(" --lightmap-reduction {reduction}"),
+        };
+        format!(
+            "--shading {}{shadows} --light-threshold {}{samples}{maps}",
+            self.shading, self.light_threshold
+        )
     }
 
     /// Returns the part of the settings that a level's file stores.
@@ -145,20 +160,15 @@ impl DrawSettings {
         FrameSettings {
             multisample: Some(self.multisample),
             light_threshold: self.light_threshold,
+            shadows: self.shadows,
             shadow_resolution: self.shadow_resolution,
             shadow_filter: self.shadow_filter,
         }
     }
 
-    /// Applies the part of the settings that belongs to the World. Objects that choose their shading keep it.
-    pub(super) fn set(&self, world: &mut World) {
-        let mut settings = world.get_resource_or_insert_with(SceneSettings::default);
-        (settings.shading, settings.frame) = (self.shading, self.frame());
-    }
-
-    /// Returns the part of the settings that belongs to the frame.
-    pub(super) fn options(&self) -> FrameOptions {
-        FrameOptions { shadows: self.shadows, ..FrameOptions::default() }
+    /// Returns the settings of a scene that is drawn so. Objects that choose their shading keep it.
+    pub(super) fn of_scene(&self, own: SceneSettings) -> SceneSettings {
+        SceneSettings { shading: self.shading, frame: self.frame(), ..own }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The goal of tuning, and which settings reach it best.
 
-use crate::Point;
+use crate::{ErrorOf, Point, Spread};
 
 /// The limits that settings have to keep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,17 +15,28 @@ pub struct Goal {
 /// medium grey.
 const ALIKE: f64 = 0.002;
 
+/// Returns true if two errors look alike.
+pub(crate) fn look_alike(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ALIKE
+}
+
+/// Returns true if a time and an error keep the limits.
+pub(crate) fn keeps(goal: Goal, time: Spread, error: ErrorOf) -> bool {
+    goal.milliseconds.is_none_or(|most| time.median <= most)
+        && goal.error.is_none_or(|most| error.relative_rmse <= most)
+}
+
 /// Returns the settings that reach the goal best: with a time limit, those with the least error, or the
 /// cheapest of those that look alike; otherwise the fastest.
 pub(crate) fn choose(points: &[Point], goal: Goal) -> Option<usize> {
     let known = points
         .iter()
         .enumerate()
-        .filter_map(|(place, point)| Some((place, point.milliseconds?.median, point.error?.relative_rmse)));
-    let keeps = |(_, time, error): &(usize, f64, f64)| {
-        goal.milliseconds.is_none_or(|most| *time <= most) && goal.error.is_none_or(|most| *error <= most)
-    };
-    let kept: Vec<(usize, f64, f64)> = known.filter(keeps).collect();
+        .filter_map(|(place, point)| Some((place, point.milliseconds?, point.error?)));
+    let kept: Vec<(usize, f64, f64)> = known
+        .filter(|(_, time, error)| keeps(goal, *time, *error))
+        .map(|(place, time, error)| (place, time.median, error.relative_rmse))
+        .collect();
     let least = kept.iter().map(|(.., error)| *error).fold(f64::INFINITY, f64::min);
     let most = if goal.milliseconds.is_some() { least + ALIKE } else { f64::INFINITY };
     let alike = kept.into_iter().filter(|(.., error)| *error <= most);

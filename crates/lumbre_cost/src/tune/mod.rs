@@ -4,8 +4,10 @@
 mod candidates;
 mod draw_settings;
 mod goal;
+mod lightmap_density;
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -13,25 +15,27 @@ use std::time::Instant;
 use bevy_ecs::prelude::*;
 use lumbre_optics::Shading;
 use lumbre_render::{FrameOptions, Gpu, Renderer};
-use lumbre_scene::{ActiveCamera, Camera, Lightmap, Name};
+use lumbre_scene::{ActiveCamera, Camera, Name, SceneSettings, reduce_lightmaps};
 
 pub(crate) use self::candidates::Candidates;
 pub use self::draw_settings::DrawSettings;
 pub(crate) use self::draw_settings::{Choices, Stage};
 pub use self::goal::Goal;
 pub(crate) use self::goal::choose;
+pub use self::lightmap_density::LIGHTMAP_BYTES;
+use self::lightmap_density::LightmapSizes;
 use crate::compile_ahead::device_ahead;
 use crate::converged::ConvergedBakes;
 use crate::findings::{cost_of, percent, short};
 use crate::folder::Folder;
 use crate::frame::Frame;
-use crate::frames::{DrawnFrame, draw_frames};
+use crate::frames::{DrawnFrame, draw_in_rounds};
 use crate::machine::machine;
 use crate::measured::Measured;
+use crate::rounds::Rounds;
 use crate::scene_file::SceneFile;
 use crate::{
     Conditions, CostError, CostReport, ErrorOver, Listener, Plot, Point, Quantity, Settings, Spread, Study,
-    pareto_front,
 };
 
 /// The result of tuning.
@@ -42,7 +46,8 @@ pub struct Tuned {
     pub study: Study,
     /// The settings of each point of the study.
     pub settings: Vec<DrawSettings>,
-    /// Indices of the points that no other one beats, from the cheapest to the most accurate.
+    /// Indices of the points that no other one beats in time, error and bytes of lightmaps, from the cheapest to
+    /// the most accurate.
     pub front: Vec<usize>,
     /// Index of the point that reaches the goal best; `None` if none does.
     pub chosen: Option<usize>,
@@ -119,18 +124,29 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     let choices = Choices::of(&mut world, None);
     let mut own = world.query::<&Shading>();
     let choosers = own.iter(&world).count();
-    let lightmapped = world.query::<&Lightmap>().iter(&world).count();
+    let lightmaps = LightmapSizes::of(&mut world);
+    let mut worlds = Worlds { scene, aspect: conditions.aspect(), by_reduction: BTreeMap::new() };
 
     let mut measured = Measured { study: study(&scene.name), ..Measured::default() };
     let mut found = Candidates::default();
+    // Once it is known at which cameras frames take longest, stages are timed there alone.
+    let every = vec![true; cameras.len()];
+    let mut slow = every.clone();
     let stages = Stage::ALL.len() as f64;
+    let rounds = conditions.rounds(SECONDS[0] / stages);
+    // What a stage drops is not chosen any more, and what it keeps is measured again: the fewest rounds that tell
+    // times apart suffice for a quick result.
+    let rounds_of_stage =
+        Rounds { min: conditions.unless_quick(rounds.min, Spread::MIN_ROUNDS_TO_DISTINGUISH), ..rounds };
     for (place, stage) in Stage::ALL.into_iter().enumerate() {
         let share = |place: usize| 0.6 * place as f64 / stages;
         let ways = found.next(stage, &choices);
         if ways.len() > 1 {
             let told = [share(place), share(place + 1)];
-            let drawn = draw_at_cameras(conditions, scene, &cameras, &ways, SECONDS[0] / stages, told)?;
+            let drawn =
+                draw_at_cameras(conditions, &mut worlds, (&cameras, &slow), &ways, rounds_of_stage, told)?;
             if found.settings.is_empty() {
+                slow = slowest(&drawn, cameras.len());
                 for (number, ((_, name), exact)) in cameras.iter().zip(drawn.iter().flatten()).enumerate() {
                     measured.keep_reference(&reference_name(number, name), exact.picture.clone());
                 }
@@ -144,32 +160,71 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
         }
     }
     // Only the ways that may be chosen are worth more rounds.
-    let contenders = found.contenders();
-    let ways: Vec<DrawSettings> = contenders.iter().map(|&one| found.settings[one]).collect();
-    let again = draw_at_cameras(conditions, scene, &cameras, &ways, SECONDS[1], [0.6, 1.0])?;
-    for (&place, again) in contenders.iter().zip(&again) {
-        found.points[place].milliseconds = longest(again);
+    let ways: Vec<DrawSettings> = found.contenders().iter().map(|&one| found.settings[one]).collect();
+    let sizes = |way: &DrawSettings| lightmaps.bytes(way.lightmap_reduction);
+    let mut measure = |ways: &[DrawSettings], found: &mut Candidates, told: [f64; 2]| {
+        let drawn = draw_at_cameras(
+            conditions,
+            &mut worlds,
+            (&cameras, &every),
+            ways,
+            conditions.rounds(SECONDS[1]),
+            told,
+        )?;
+        found.begin();
+        for (way, drawn) in ways.iter().zip(&drawn) {
+            found.take(*way, longest(drawn), |label| {
+                point(conditions, scene, &cameras, (way, label), drawn, &mut measured)
+            })?;
+        }
+        Ok::<_, CostError>(())
+    };
+    measure(&ways, &mut found, [0.6, if lightmaps.is_empty() { 1.0 } else { 0.8 }])?;
+    let mut front = found.front();
+    let mut chosen = found.chosen(&front, goal);
+    let mut of_lightmaps = Vec::new();
+    // Without a goal, the errors of coarser lightmaps show best beside the most accurate settings.
+    if let Some(of) = chosen.or(front.last().copied()).filter(|_| !lightmaps.is_empty()) {
+        let variants = lightmap_density::variants(found.settings[of]);
+        let others: Vec<DrawSettings> = front.iter().map(|&one| found.settings[one]).collect();
+        let ways: Vec<DrawSettings> = others.into_iter().chain(variants.iter().copied().skip(1)).collect();
+        measure(&ways, &mut found, [0.8, 1.0])?;
+        let places: Vec<usize> = variants.iter().filter_map(|variant| found.place(variant)).collect();
+        let points: Vec<(&Point, f64)> =
+            places.iter().map(|&place| (&found.points[place], sizes(&found.settings[place]))).collect();
+        chosen =
+            chosen.map(|chosen| lightmap_density::choose(&points, goal).map_or(chosen, |one| places[one]));
+        of_lightmaps = lightmap_density::findings(&points);
+        front = lightmap_density::front(&found, sizes);
     }
     let Candidates { settings, points, .. } = found;
     let mut study = Study { points, ..std::mem::take(&mut measured.study) };
+    if !lightmaps.is_empty() {
+        for (point, way) in study.points.iter_mut().zip(&settings) {
+            point.counts.insert(LIGHTMAP_BYTES.to_owned(), sizes(way));
+        }
+    }
     if choosers > 0 {
         study.notes.push(format!(
             "{choosers} objects choose their own shading and keep it here; --shading in the commands overrides it."
         ));
     }
-    if lightmapped > 0 {
-        study.notes.push(
-            "The density of lightmaps is not among the settings: it affects their error and size, but hardly the time of a frame; `lumbre cost --study lightmaps` shows by how much."
-                .into(),
-        );
-    }
-    // The other ways are beaten, and their times are from earlier rounds.
-    let last: Vec<Point> = contenders.iter().map(|&place| study.points[place].clone()).collect();
-    let place = |point: &Point| Some(contenders[last.iter().position(|other| std::ptr::eq(other, point))?]);
-    let front: Vec<usize> = pareto_front(&last).into_iter().filter_map(place).collect();
-    let chosen = choose(&last, goal).map(|place| contenders[place]);
     study.findings = findings(&study.points, &front, chosen, goal, cameras.len());
+    study.findings.extend(of_lightmaps);
     Ok(Tuned { study, settings, front, chosen, pictures: measured })
+}
+
+/// Returns for each camera whether frames there may be the slowest with some of these settings: where their range
+/// of times is not below that of the slowest camera.
+fn slowest(drawn: &[Vec<DrawnFrame>], cameras: usize) -> Vec<bool> {
+    let mut slow = vec![false; cameras];
+    for of_way in drawn {
+        let Some(longest) = longest(of_way) else { continue };
+        for (slow, drawn) in slow.iter_mut().zip(of_way) {
+            *slow |= drawn.spread().is_some_and(|spread| !spread.is_below(&longest));
+        }
+    }
+    slow
 }
 
 /// Returns the name of a camera's reference picture.
@@ -195,27 +250,53 @@ fn cameras(world: &mut World) -> Vec<(Entity, String)> {
     found.into_iter().map(|(entity, name, _)| (entity, name)).collect()
 }
 
-/// Draws frames with some settings at every camera, and returns them by settings and camera. `told` are the
+/// The level, as it is read and with coarser lightmaps. Ways to draw it share these Worlds, so that a renderer
+/// uploads each of them once.
+struct Worlds<'a> {
+    scene: &'a SceneFile,
+    aspect: f64,
+    by_reduction: BTreeMap<u32, (Arc<Mutex<World>>, SceneSettings)>,
+}
+
+impl Worlds<'_> {
+    /// Returns the World with lightmaps reduced by this much, and the settings of the file.
+    ///
+    /// # Errors
+    /// [`CostError::Load`].
+    fn with_lightmaps(&mut self, reduction: u32) -> Result<(Arc<Mutex<World>>, SceneSettings), CostError> {
+        if let Some(known) = self.by_reduction.get(&reduction) {
+            return Ok(known.clone());
+        }
+        let mut world = self.scene.open(self.aspect)?;
+        reduce_lightmaps(&mut world, reduction);
+        let own = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+        let new = (Arc::new(Mutex::new(world)), own);
+        self.by_reduction.insert(reduction, new.clone());
+        Ok(new)
+    }
+}
+
+/// Draws frames with some settings at every camera, times those at the cameras for which `timed` says so, and
+/// returns all by settings and camera. `told` are the
 /// fractions that are done before and after.
 fn draw_at_cameras(
     conditions: &Conditions<'_>,
-    scene: &SceneFile,
-    cameras: &[(Entity, String)],
+    worlds: &mut Worlds<'_>,
+    (cameras, timed): (&[(Entity, String)], &[bool]),
     ways: &[DrawSettings],
-    seconds: f64,
+    rounds: Rounds,
     told: [f64; 2],
 ) -> Result<Vec<Vec<DrawnFrame>>, CostError> {
     let mut frames = Vec::new();
     for settings in ways {
-        let mut world = scene.open(conditions.aspect())?;
-        settings.set(&mut world);
-        let world = Arc::new(Mutex::new(world));
-        for (camera, _) in cameras {
-            let options = FrameOptions { camera: Some(*camera), ..settings.options() };
-            frames.push(Frame::of(&world, options).sharing("tune"));
+        let (world, own) = worlds.with_lightmaps(settings.lightmap_reduction)?;
+        for ((camera, _), is_timed) in cameras.iter().zip(timed) {
+            let options = FrameOptions { camera: Some(*camera), ..FrameOptions::default() };
+            let frame = Frame::of(&world, options).with_settings(settings.of_scene(own)).sharing("tune");
+            frames.push(frame.timed(*is_timed));
         }
     }
-    let mut drawn = draw_frames(conditions, frames, seconds, told)?.into_iter();
+    let mut drawn = draw_in_rounds(conditions, frames, rounds, told)?.into_iter();
     let mut found = Vec::new();
     while drawn.len() > 0 {
         found.push(drawn.by_ref().take(cameras.len()).collect());
@@ -270,7 +351,7 @@ fn study(scene: &str) -> Study {
         name: "tune".into(),
         title: format!("Settings for {scene}"),
         question: "Which settings draw the level with the least error within a time, or in the least time within an error?".into(),
-        reference: "the most accurate settings: Phong shading with soft shadows of twice the default resolution, lamps that do not end, and four samples per pixel; times are those of the slowest camera, and errors those of the camera with the largest error".into(),
+        reference: "the most accurate settings: Phong shading with soft shadows of twice the default resolution, lamps that do not end, four samples per pixel, and the file's lightmaps; times are those of the slowest camera, and errors those of the camera with the largest error".into(),
         plots: vec![Plot {
             title: "Error over time".into(),
             across: Quantity::Milliseconds,

@@ -1,20 +1,23 @@
-//! The regression gate: compares the counts of cheap studies with stored ones, by the code behind `lumbre
+//! The regression gate: compares the counts of all studies with stored ones, by the code behind `lumbre
 //! cost --compare`. Only counts of the CPU are used, which are the same on every machine: triangles, draw
 //! calls, uploaded bytes, lamps in lists, rays, texels, patches.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use lumbre_cost::{Change, CostOptions, CostReport, What, compare_reports, read_report};
+use lumbre_cost::{Change, CostOptions, CostReport, STUDIES, What, compare_reports, read_report};
 
 use super::{measured, options};
 
-/// The studies whose counts are compared.
-const WATCHED: &[&str] = &["shading", "need", "lamps", "bake", "preprocessing", "reflection"];
 /// The factor by which a count may grow. The last digits of f32 decide whether a lamp reaches a cluster, and
 /// when a bake has enough rays.
 const FACTOR: f64 = 1.1;
 const RENEWED_BY: &str = "LUMBRE_WRITE_GOLDENS=1 cargo test --workspace --test studies counts";
+
+/// Returns the studies whose counts are compared: all of them.
+fn watched() -> Vec<&'static str> {
+    STUDIES.iter().map(|study| study.name).collect()
+}
 
 fn kept() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/studies/counts.json")
@@ -31,7 +34,7 @@ fn faults(kept: &CostReport, counted: &CostReport) -> Vec<String> {
 #[test]
 fn counts_have_not_grown() {
     let folder = tempfile::tempdir().unwrap();
-    let asked = CostOptions { counts_only: true, size: (96, 54), ..options(WATCHED, Vec::new()) };
+    let asked = CostOptions { counts_only: true, size: (96, 54), ..options(&watched(), Vec::new()) };
     let counted = measured(&asked, folder.path());
     if std::env::var_os("LUMBRE_WRITE_GOLDENS").is_some() {
         fs::copy(folder.path().join(lumbre_cost::REPORT), kept()).unwrap();
@@ -66,7 +69,7 @@ fn counts_have_not_grown() {
         }
     }
     // No study is empty, and nothing in them is a time or belongs to this machine.
-    for name in WATCHED {
+    for name in watched() {
         let study = before.study(name).unwrap();
         assert!(!study.points.is_empty(), "nothing was counted of {name}");
         for point in &study.points {

@@ -90,8 +90,8 @@ fn a_views_front_leads_from_what_is_cheap_to_what_is_exact() {
     assert_eq!(*settings, before, "the World has its own settings again");
 }
 
-/// A lamp below the floor contributes nothing, and one of two equal lamps half of what both do. Many lamps
-/// are measured by their kind.
+/// A lamp below the floor contributes nothing, and one of two equal lamps half of what both do. Of many
+/// lamps those that give most are measured alone.
 #[test]
 fn what_lights_give_is_known() {
     let mut world = floor(1);
@@ -114,14 +114,30 @@ fn what_lights_give_is_known() {
     let mut lights = world.query::<&Light>();
     assert!(lights.iter(&world).all(|light| light.enabled), "they shine again");
     assert!(world.get::<EmissiveLight>(panel).is_some());
+    // Of many lights those that contribute most are measured one by one, and the others together.
     for number in 0..20 {
-        lamp(&mut world, "one of many", 1.0, (f64::from(number), 3.0, 0.0));
+        lamp(&mut world, &format!("faint {number}"), 0.01, (0.1 * f64::from(number), 3.0, 0.0));
+    }
+    for number in 0..10 {
+        lamp(&mut world, &format!("bright {number}"), 1.0, (0.1 * f64::from(number), 3.0, 0.0));
     }
     update_transforms(&mut world);
     let found = costs(&mut side, &mut world);
-    let many = found.iter().find(|cost| cost.name == "point lights").expect("they are one group");
-    assert_eq!((many.lights, found.len()), (23, 2), "{found:?}");
-    assert!(many.difference > 0.99, "{many:?}");
+    let of = |name: &str| found.iter().find(|cost| cost.name == name);
+    // Twelve alone, the faint ones and the one below the floor together, and the panel.
+    assert_eq!(found.len(), 14, "{found:?}");
+    for name in (0..10).map(|number| format!("bright {number}")).chain(["left", "right"].map(str::to_owned)) {
+        assert!(
+            of(&name).is_some_and(|cost| cost.lights == 1 && cost.difference > 0.01),
+            "{name}: {found:?}"
+        );
+    }
+    let others = of("other point lights").expect("they are one group");
+    assert_eq!(others.lights, 21, "{others:?}");
+    assert!(others.difference > 0.0 && others.difference < 0.05, "{others:?}");
+    assert_eq!(found.iter().map(|cost| cost.lights).sum::<usize>(), 34, "each light is in one of them");
+    let mut lights = world.query::<&Light>();
+    assert!(lights.iter(&world).all(|light| light.enabled), "they shine again");
 }
 
 /// The error of a frame of one quad under Gouraud shading, computed from two pictures; none where the frame

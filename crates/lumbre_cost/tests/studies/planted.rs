@@ -11,7 +11,7 @@ use lumbre_cost::{DrawSettings, Goal, TuneOptions, Tuned, read_report, tune};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Light, Material, Shading, SpotCone, Surface};
 use lumbre_render::Gpu;
-use lumbre_scene::{Camera, Mesh, Name, ShadowFilter, Transform};
+use lumbre_scene::{Camera, Lightmap, LightmapEncoding, LightmapImage, Mesh, Name, ShadowFilter, Transform};
 
 use super::saved;
 
@@ -170,4 +170,54 @@ fn shadows_go_where_nobody_sees_them_and_lose_what_they_do_not_need() {
     // Without the penumbra of a wide lamp, the picture is wrong.
     let (chosen, tuned) = cheapest_within(0.02, block_in_the_light(0.0, 0.3));
     assert!(chosen.shadows && chosen.shadow_filter == ShadowFilter::Soft, "{:?}", tuned.study.findings);
+}
+
+/// A floor whose baked light, in a map of 256 x 256 texels, is this over the map's columns.
+fn baked_floor(light: impl Fn(usize) -> f32) -> World {
+    const SIDE: usize = 256;
+    let mut world = World::new();
+    let mut plane = shapes::plane(24.0, 24.0, 1, 1);
+    plane.uv1 = plane.uv0.clone();
+    let texels = (0..SIDE * SIDE).map(|at| Vec3::splat(light(at % SIDE))).collect();
+    let (width, height) = (SIDE as u32, SIDE as u32);
+    let encoding = LightmapEncoding::Rgb16Float;
+    let image = Arc::new(LightmapImage { name: "floor.exr".into(), width, height, texels, encoding });
+    world.spawn((
+        Name::new("floor"),
+        Mesh(Arc::new(plane)),
+        Material::matt(Vec3::splat(0.6)),
+        Lightmap { image },
+    ));
+    seen_from_above(&mut world);
+    world
+}
+
+#[test]
+fn lightmaps_lose_the_texels_that_their_light_does_not_need() {
+    let bytes = |tuned: &Tuned, place: usize| tuned.study.points[place].counts["bytes of lightmaps"];
+    // Light that changes little over eight texels.
+    let smooth = || baked_floor(|column| 0.5 + 0.3 * (column as f32 / 40.0).sin());
+    for goal in
+        [Goal { milliseconds: None, error: Some(0.01) }, Goal { milliseconds: Some(1e6), error: None }]
+    {
+        let tuned = tuned(smooth(), goal, None);
+        let chosen = tuned.chosen.unwrap();
+        let reduction = tuned.settings[chosen].lightmap_reduction;
+        assert_eq!(reduction, 8, "{:?}", tuned.study.findings);
+        let full = tuned.settings.iter().position(|settings| settings.lightmap_reduction == 1).unwrap();
+        assert_eq!(bytes(&tuned, full), 8.0 * 256.0 * 256.0);
+        assert_eq!(bytes(&tuned, chosen), 8.0 * 32.0 * 32.0);
+        assert!(tuned.front.contains(&chosen), "{:?}", tuned.front);
+        let says = |words: &str| tuned.study.findings.iter().any(|finding| finding.contains(words));
+        assert!(says("the lightmaps take 0.524 MB"), "{:?}", tuned.study.findings);
+    }
+    // A shadow every other two texels, across those of half the density: they show one grey.
+    let sharp = || baked_floor(|column| if column.div_ceil(2).is_multiple_of(2) { 0.1 } else { 0.9 });
+    for goal in
+        [Goal { milliseconds: None, error: Some(0.05) }, Goal { milliseconds: Some(1e6), error: None }]
+    {
+        let tuned = tuned(sharp(), goal, None);
+        assert_eq!(tuned.settings[tuned.chosen.unwrap()].lightmap_reduction, 1, "{:?}", tuned.study.findings);
+        assert!(error_of(&tuned, |settings| settings.lightmap_reduction == 2) > 0.3);
+    }
 }

@@ -259,6 +259,7 @@ mod tests {
             shadow_resolution: 1.0,
             light_threshold: 0.0,
             multisample: false,
+            lightmap_reduction: 1,
         };
         let times = [0.98 * milliseconds, milliseconds, 1.02 * milliseconds];
         let milliseconds = Spread::of(&times).expect("there are times");

@@ -65,7 +65,7 @@ pub(crate) struct LightRecords {
     state: Option<(WorldId, Extraction)>,
     kept: EntitySlots<Kept>,
     /// Origin of frame space and light settings that the records were computed for.
-    made_for: Option<(DVec3, f32, ShadowFilter)>,
+    made_for: Option<(DVec3, f32, bool, ShadowFilter)>,
     updates: u64,
     /// Slots of the lights that shine: dynamic ones first, then in the order of their entities, so that sums
     /// are the same every time.
@@ -86,7 +86,7 @@ impl LightRecords {
             *self = Self { state: Some((world.id(), SystemState::new(world))), ..Self::default() };
         }
         self.updates += 1;
-        let made_for = Some((origin, settings.light_threshold, settings.shadow_filter));
+        let made_for = Some((origin, settings.light_threshold, settings.shadows, settings.shadow_filter));
         let remade = std::mem::replace(&mut self.made_for, made_for) != made_for;
         self.order.clear();
         let Some((id, mut state)) = self.state.take() else { return };

@@ -1,18 +1,21 @@
-//! A light as the frames of a scene show it: its range is limited where it becomes too dim, and it has a size
-//! only if shadows have a penumbra. Light records and bakes are not handled here.
+//! A light as the frames of a scene show it: its range is limited where it becomes too dim, it casts a shadow
+//! only if the scene's frames have shadows, and it has a size only if these have a penumbra. Light records and bakes are not handled here.
 
 use std::borrow::Cow;
 
 use lumbre_optics::{Light, LightKind};
 use lumbre_scene::{FrameSettings, ShadowFilter};
 
-/// Returns the light with the range that follows from the threshold, if that is less than its own, and with a
-/// size only for soft shadows. The light is cloned only if something differs.
+/// Returns the light with the range that follows from the threshold, if that is less than its own, without a
+/// shadow if the settings leave shadows out, and with a size only for soft shadows. The light is cloned only if something differs.
 pub(super) fn shown_light<'a>(light: &'a Light, settings: &FrameSettings) -> Cow<'a, Light> {
     let mut shown = Cow::Borrowed(light);
     let range = range(light, settings.light_threshold);
     if range < light.attenuation.range {
         shown.to_mut().attenuation.range = range;
+    }
+    if light.shadow && !settings.shadows {
+        shown.to_mut().shadow = false;
     }
     let has_size = light.shadow && (light.radius > 0.0 || light.angle > 0.0);
     if has_size && settings.shadow_filter != ShadowFilter::Soft {

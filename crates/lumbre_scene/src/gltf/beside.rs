@@ -31,17 +31,19 @@ pub(crate) fn copy(
     output: &Path,
     files: &mut Files,
 ) -> Result<Copied, SaveError> {
-    copy_named(root, base, output, files, false)
+    copy_named(root, base, output, files, None)
 }
 
-/// As [`copy`], including the images of baked light, for an output that keeps them.
+/// As [`copy`], including the images of baked light, for an output that keeps them, except those with the URIs
+/// `made`, which are written with the output.
 pub(crate) fn copy_with_light(
     root: &mut Value,
     base: Base<'_>,
     output: &Path,
     files: &mut Files,
+    made: HashSet<String>,
 ) -> Result<Copied, SaveError> {
-    copy_named(root, base, output, files, true)
+    copy_named(root, base, output, files, Some(made))
 }
 
 fn copy_named(
@@ -49,11 +51,11 @@ fn copy_named(
     base: Base<'_>,
     output: &Path,
     files: &mut Files,
-    with_light: bool,
+    made_light: Option<HashSet<String>>,
 ) -> Result<Copied, SaveError> {
     let beside = output.parent().unwrap_or(Path::new(""));
     let mut copies =
-        Copies { base, output, beside, files, with_light, former: former(output), copied: Copied::default() };
+        Copies { base, output, beside, files, made_light, former: former(output), copied: Copied::default() };
     let real =
         |folder: &Path| fs::canonicalize(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
     match (real(base.folder.unwrap_or(Path::new(""))), real(beside)) {
@@ -82,8 +84,8 @@ struct Copies<'a> {
     output: &'a Path,
     beside: &'a Path,
     files: &'a mut Files,
-    /// Whether the images of lightmaps and irradiance volumes are copied too.
-    with_light: bool,
+    /// If the images of lightmaps and irradiance volumes are copied too, the URIs of those that are not.
+    made_light: Option<HashSet<String>>,
     former: HashSet<String>,
     copied: Copied,
 }
@@ -99,8 +101,10 @@ impl Copies<'_> {
                         Value::String(text) if key == "uri" && !text.starts_with("data:") => {
                             *text = self.copy(text)?;
                         }
-                        Value::Object(light) if self.with_light && LIGHT.contains(&key.as_str()) => {
-                            if let Some(Value::String(image)) = light.get_mut("image") {
+                        Value::Object(light) if LIGHT.contains(&key.as_str()) => {
+                            if let Some(Value::String(image)) = light.get_mut("image")
+                                && self.made_light.as_ref().is_some_and(|made| !made.contains(image))
+                            {
                                 self.copy_packed(image)?;
                                 *image = self.copy(image)?;
                             }

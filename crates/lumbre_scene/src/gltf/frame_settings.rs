@@ -16,6 +16,8 @@ pub(crate) struct FrameExtension {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub light_threshold: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub shadows: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub shadow_resolution: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shadow_filter: Option<String>,
@@ -58,7 +60,13 @@ pub(crate) fn read(source: &FrameExtension, place: &str) -> Result<FrameSettings
         })?,
         None => usual.shadow_filter,
     };
-    Ok(FrameSettings { multisample: source.multisample, light_threshold, shadow_resolution, shadow_filter })
+    Ok(FrameSettings {
+        multisample: source.multisample,
+        light_threshold,
+        shadows: source.shadows.unwrap_or(usual.shadows),
+        shadow_resolution,
+        shadow_filter,
+    })
 }
 
 /// The settings as JSON, without those equal to the defaults; `None` if all are.
@@ -84,6 +92,7 @@ pub(crate) fn written(settings: &FrameSettings) -> Result<Option<FrameExtension>
     Ok(Some(FrameExtension {
         multisample: settings.multisample,
         light_threshold: unless(settings.light_threshold.max(0.0), usual.light_threshold),
+        shadows: Some(settings.shadows).filter(|shadows| *shadows != usual.shadows),
         shadow_resolution: unless(resolution, usual.shadow_resolution),
         shadow_filter: filter.map(|filter| filter.name().to_owned()),
     }))

@@ -56,7 +56,7 @@ fn bake(world: &mut World) {
             name: "light".into(),
             width: 2,
             height: 2,
-            texels: vec![Vec3::splat(0.25); 4],
+            texels: [0.25, 0.5, 0.125, 1.0].map(Vec3::splat).to_vec(),
             encoding: LightmapEncoding::Rgb32Float,
         };
         world.entity_mut(entity).insert((Mesh(new.clone()), Lightmap { image: Arc::new(image) }));
@@ -271,10 +271,11 @@ fn settings_change_and_baked_light_stays_in_any_folder() {
     let frame = FrameSettings {
         multisample: Some(false),
         light_threshold: 0.25,
+        shadows: false,
         shadow_resolution: 0.5,
         shadow_filter: ShadowFilter::PercentageCloser,
     };
-    let settings = FileSettings { shading: Shading::Gouraud, shadows: false, frame };
+    let settings = FileSettings { shading: Shading::Gouraud, frame, lightmap_reduction: 1 };
     for folder in [folder.path(), other.path()] {
         let tuned = folder.join("tuned.glb");
         save_settings(&output, &tuned, settings).unwrap();
@@ -291,6 +292,32 @@ fn settings_change_and_baked_light_stays_in_any_folder() {
         packed(folder.path()),
         "what lies beside the maps for others goes along"
     );
+
+    // Smaller lightmaps are files of their own, for others too; nobody copies the former ones along.
+    let elsewhere = tempfile::tempdir().unwrap();
+    for folder in [folder.path(), elsewhere.path()] {
+        let small = folder.join("small.glb");
+        let reduced = FileSettings { lightmap_reduction: 2, ..settings };
+        let report = save_settings(&output, &small, reduced).unwrap();
+        assert_eq!(names(&folder.join("small.lightmaps")), ["cube.exr", "cube.ktx2"]);
+        assert_eq!(report.lightmaps.len(), 2);
+        let mut world = World::new();
+        load(&mut world, &output).unwrap();
+        reduce_lightmaps(&mut world, 2);
+        let expected: Vec<Vec<Vec3>> =
+            world.query::<&Lightmap>().iter(&world).map(|map| map.image.texels.clone()).collect();
+        assert_eq!(light(&small), (Shading::Gouraud, frame, expected.clone()));
+        assert!(expected[0].len() * 3 < maps[0].len(), "{} texels of {}", expected[0].len(), maps[0].len());
+        // The next bake starts from the artist's file, as it would from the baked one.
+        let pristine = |path: &Path| {
+            let mut source = SourceFile::read(path, &LoadOptions::default()).unwrap();
+            let mut world = World::new();
+            source.load_into(&mut world).unwrap();
+            world.query::<&Lightmap>().iter(&world).count()
+        };
+        assert_eq!((pristine(&small), pristine(&output)), (0, 0));
+    }
+    assert!(!elsewhere.path().join("room.baked.lightmaps").exists());
 
     let refused = save_settings(&output, &other.path().join("tuned.gltf"), settings);
     assert!(matches!(refused, Err(SaveError::Container { .. })), "{refused:?}");
