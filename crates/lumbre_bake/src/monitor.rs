@@ -135,7 +135,7 @@ impl<'a> BakeMonitor<'a> {
 
     /// A clock whose limit is the running stage's share of the time limit. It can be copied to other threads.
     pub fn clock(&self) -> Clock {
-        self.clock.until(self.running().share_of_limit())
+        self.clock.until(self.running().profile().share_of_limit)
     }
 
     /// Seconds that the bake has taken, including those of interrupted bakes that it resumes.
@@ -144,9 +144,6 @@ impl<'a> BakeMonitor<'a> {
     }
 
     /// Ends the running stage and begins `stage`.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn stage(&mut self, stage: Stage, report: &mut BakeReport) -> Result<(), BakeError> {
         self.end_stage(report);
         self.stage = Some((stage, Instant::now()));
@@ -165,16 +162,14 @@ impl<'a> BakeMonitor<'a> {
     /// Writes the time of the running stage into the report.
     pub fn end_stage(&mut self, report: &mut BakeReport) {
         if let Some((stage, begun)) = self.stage.take() {
-            report
-                .stages
-                .push(StageTime { stage: stage.name().to_owned(), seconds: begun.elapsed().as_secs_f64() });
+            report.stages.push(StageTime {
+                stage: stage.profile().name.to_owned(),
+                seconds: begun.elapsed().as_secs_f64(),
+            });
         }
     }
 
     /// Reports that `stage_fraction` of the running stage, or of its current pass, is done.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn advance(&mut self, stage_fraction: f32) -> Result<(), BakeError> {
         let progress = self.progress(stage_fraction);
         if (self.callback)(progress).is_break() {
@@ -186,9 +181,6 @@ impl<'a> BakeMonitor<'a> {
     /// Runs `work` on this thread while another thread calls the progress callback regularly. If that cancels the bake,
     /// [`BakeMonitor::stop`] is set, which `work` should poll, and its result is discarded. `stage_fraction` is the
     /// progress of the running stage, or of its pass, at the beginning of `work`.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn run_interruptible<T>(
         &mut self,
         stage_fraction: f32,
@@ -218,9 +210,6 @@ impl<'a> BakeMonitor<'a> {
 
     /// As [`BakeMonitor::run_interruptible`], but for work that does not poll [`BakeMonitor::stop`]. It runs on a
     /// thread of its own, which is left to finish by itself if the bake is cancelled.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn run_detached<T: Send + 'static>(
         &mut self,
         stage_fraction: f32,
@@ -262,15 +251,20 @@ impl<'a> BakeMonitor<'a> {
 
     fn cancelled<T>(&mut self) -> Result<T, BakeError> {
         self.checkpoint.flush();
-        Err(BakeError::Cancelled { stage: self.running().name() })
+        Err(BakeError::Cancelled { stage: self.running().profile().name })
     }
 
     fn progress(&self, stage_fraction: f32) -> Progress {
         let stage = self.running();
         let (begin, end) = self.pass;
         let stage_fraction = begin + (end - begin) * stage_fraction.clamp(0.0, 1.0);
-        let fraction = stage.share_of_bake_before() + stage.share_of_bake() * stage_fraction;
-        Progress { stage: stage.name(), stage_fraction, fraction: fraction.min(1.0), error: self.error }
+        let fraction = stage.share_of_bake_before() + stage.profile().share_of_bake * stage_fraction;
+        Progress {
+            stage: stage.profile().name,
+            stage_fraction,
+            fraction: fraction.min(1.0),
+            error: self.error,
+        }
     }
 
     fn check_cancelled(&mut self) -> Result<(), BakeError> {

@@ -59,9 +59,6 @@ pub(crate) fn scene(
 
 /// Collects the light sources. The report lists the kinds of sources that the scene does not have, and warns of
 /// emissive textures with finer detail than is sampled.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn sources<'a>(
     input: &StaticScene,
     scene: &'a BakeScene,

@@ -10,8 +10,8 @@ use crate::final_gather::map_error::MapError;
 use crate::finish::worst_places::worst_places;
 use crate::monitor::BakeMonitor;
 use crate::scene::SceneObject;
-use crate::stage::Stage;
-use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
+use crate::stage::{Stage, StageProfile};
+use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime, StageTime};
 
 /// Ends the last stage and writes the times and the checkpoint's warnings.
 pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> BakeReport {
@@ -25,9 +25,10 @@ pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> B
     }
     report.resumed_seconds = monitor.checkpoint.resumed;
     report.warnings.append(&mut monitor.checkpoint.warnings);
-    let casting: Vec<&str> =
-        Stage::ALL.into_iter().filter(|stage| stage.casts_rays()).map(Stage::name).collect();
-    let casting = report.stages.iter().filter(|stage| casting.contains(&stage.stage.as_str()));
+    let casting: Vec<StageProfile> =
+        Stage::ALL.into_iter().map(Stage::profile).filter(|profile| profile.casts_rays).collect();
+    let is_casting = |stage: &&StageTime| casting.iter().any(|profile| profile.name == stage.stage);
+    let casting = report.stages.iter().filter(is_casting);
     let casting: f64 = casting.map(|stage| stage.seconds).sum();
     report.mega_rays_per_second = if casting > 0.0 { report.rays as f64 * 1e-6 / casting } else { 0.0 };
     report
@@ -35,9 +36,6 @@ pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> B
 
 /// Writes what is known once every texel has its light: the mean irradiance, the worst places and, if nothing bounces,
 /// the error.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn write(
     lit: &LitTexels<'_>,
     bounces: bool,

@@ -26,9 +26,6 @@ pub(crate) struct CoveredTexels<'a> {
 
 impl<'a> CoveredTexels<'a> {
     /// Finds the covered texels, and takes what is hidden out of their footprints.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn new(
         scene: &BakeScene,
         layout: &'a LightmapLayout,

@@ -70,9 +70,6 @@ struct Walker<'a> {
 
 impl LocalLight {
     /// Estimates local light from the direct light that is known so far.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn new(
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,

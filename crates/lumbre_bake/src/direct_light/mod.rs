@@ -29,6 +29,7 @@ use crate::sampling::{Sequence, Stream};
 use crate::scene::LightmapLayout;
 use crate::sources::direct::{Direct, VisibilitySummary};
 use crate::sources::light_sources::Sources;
+use crate::sources::sampled_receiver::SampledReceiver;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions, BakeReport};
 
@@ -56,9 +57,6 @@ impl DirectLight {
 
 /// Computes the direct light of every covered texel, and the local light around it. Texels that are `known` from a
 /// previous bake keep their light; an empty list means that none is known.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn direct_light(
     sources: &Sources<'_>,
     texels: &CoveredTexels<'_>,
@@ -154,15 +152,14 @@ impl<'a> SourceSampler<'a> {
         if texel.is_hidden() {
             return Direct::default();
         }
-        let sequence = Sequence::new(self.options.seed, Stream::DirectLight, texel.index.0);
         let scene = self.sources.scene;
-        self.sources.irradiance_per_source(
-            self.cuts.of(covered),
-            &self.shafts.visibility(covered.place(), texel),
-            sequence,
+        let sampled = SampledReceiver {
+            point: |x: f32, y: f32| texel.point(scene, x, y).map(|point| receiver(scene, &point)),
+            visibility: &self.shafts.visibility(covered.place(), texel),
+            sequence: Sequence::new(self.options.seed, Stream::DirectLight, texel.index.0),
             samples,
-            &|x, y| texel.point(scene, x, y).map(|point| receiver(scene, &point)),
-        )
+        };
+        self.sources.irradiance_per_source(self.cuts.of(covered), &sampled)
     }
 
     /// The light of texels by a few samples, whatever time it takes.

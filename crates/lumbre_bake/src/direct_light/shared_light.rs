@@ -119,9 +119,6 @@ struct SmoothedLight {
 
 impl<'a> SharedLight<'a> {
     /// The first round: a few samples of every texel for whose index `is_wanted` holds.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn new(
         sources: &'a Sources<'a>,
         neighbourhoods: Neighbourhoods<'a>,
@@ -202,9 +199,6 @@ impl<'a> SharedLight<'a> {
     /// Takes more rounds. `goal` maps a share of the requested squared error to the sum over all texels of squared
     /// errors, relative to local light, that may then be left. `share` maps the samples per texel that the `least`
     /// share is expected to need to the share that is aimed at.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn refine(
         &mut self,
         local: &LocalLight,

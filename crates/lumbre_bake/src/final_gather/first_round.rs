@@ -30,9 +30,6 @@ const BLOCKS_PROGRESS: f32 = 0.1;
 
 /// Casts the `wanted` samples, which are the same number for each of their texels, or fewer if time is limited. Returns
 /// false if the time was up before the texels had as many as there seemed to be time for.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn cast_first_round(
     cache: &RadianceCache<'_>,
     texels: &CoveredTexels<'_>,
@@ -146,7 +143,7 @@ fn copy_representatives(representatives: &[CoveredTexel], gathered: &mut [Gather
                 checks: 0,
                 differences: Vec3::ZERO,
                 squared_differences: 0.0,
-                unguided: UnguidedLight::NONE,
+                unguided: UnguidedLight::default(),
                 ..sums
             };
         }
@@ -160,7 +157,7 @@ mod tests {
 
     /// Of a texel whose four replicates have one sample each of this light.
     fn sums(light: f32) -> GatherSums {
-        let unguided = UnguidedLight { light, ..UnguidedLight::NONE };
+        let unguided = UnguidedLight { light, ..UnguidedLight::default() };
         let sums = [Vec3::splat(light); REPLICATES];
         GatherSums { sums, samples: 1, rays: 4, checks: 1, unguided, ..GatherSums::default() }
     }

@@ -36,49 +36,35 @@ const UNGUIDED: f32 = 0.9;
 const NEAR_BOUNCES: u32 = 6;
 
 /// Samples that are followed together, so that what they read is on its way from memory at the same time.
-const BATCH: usize = 16;
+const WAVEFRONT: usize = 16;
 
 /// Samples to follow, each with a tag that identifies it, and their results.
-struct Batch<Tag> {
-    requests: [GatherRequest; BATCH],
-    tags: [Tag; BATCH],
+#[derive(Default)]
+struct Wavefront<Tag> {
+    requests: [GatherRequest; WAVEFRONT],
+    tags: [Tag; WAVEFRONT],
     count: usize,
-    paths: [SamplePath; BATCH],
-    results: [IncidentSample; BATCH],
+    paths: [SamplePath; WAVEFRONT],
+    results: [IncidentSample; WAVEFRONT],
 }
 
-/// A batch of samples, and the batch of real bounces that check them.
-struct Batches {
+/// A wavefront of samples, and that of the real bounces that check them.
+#[derive(Default)]
+struct Wavefronts {
     /// Tagged with replicate and sample number.
-    samples: Batch<(usize, u32)>,
-    contributions: [GatherContribution; BATCH],
-    /// Tagged with the slot of the sample in its batch, and the patch that the sample read.
-    checks: Batch<(usize, PatchIndex)>,
+    samples: Wavefront<(usize, u32)>,
+    contributions: [GatherContribution; WAVEFRONT],
+    /// Tagged with the slot of the sample in its wavefront, and the patch that the sample read.
+    checks: Wavefront<(usize, PatchIndex)>,
 }
 
 thread_local! {
     /// Reused, since clearing them for every texel takes as long as some of its rays. Nothing reads what an earlier
-    /// batch left.
-    static BATCHES: RefCell<Batches> = const {
-        RefCell::new(Batches {
-            samples: Batch::empty((0, 0)),
-            contributions: [GatherContribution::NONE; BATCH],
-            checks: Batch::empty((0, PatchIndex(0))),
-        })
-    };
+    /// wavefront left.
+    static WAVEFRONTS: RefCell<Wavefronts> = RefCell::default();
 }
 
-impl<Tag: Copy> Batch<Tag> {
-    const fn empty(tag: Tag) -> Self {
-        Self {
-            requests: [GatherRequest::NOWHERE; BATCH],
-            tags: [tag; BATCH],
-            count: 0,
-            paths: [SamplePath::NONE; BATCH],
-            results: [IncidentSample::NOTHING; BATCH],
-        }
-    }
-
+impl<Tag: Copy> Wavefront<Tag> {
     fn push(&mut self, request: GatherRequest, tag: Tag) {
         self.requests[self.count] = request;
         self.tags[self.count] = tag;
@@ -91,7 +77,7 @@ impl<Tag: Copy> Batch<Tag> {
 }
 
 /// What one sample adds to a texel's sums.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct GatherContribution {
     light: Vec3,
     weight: f32,
@@ -109,24 +95,8 @@ struct GatherContribution {
     rays: u32,
 }
 
-impl GatherContribution {
-    const NONE: Self = Self {
-        light: Vec3::ZERO,
-        weight: 0.0,
-        error: Vec2::ZERO,
-        texel_variance: 0.0,
-        reads_texel: false,
-        is_checked: false,
-        difference: Vec3::ZERO,
-        rays: 0,
-    };
-}
-
 impl RadianceCache<'_> {
     /// Casts the wanted samples. Returns true if there was time for all of them.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn cast(
         &self,
         texels: &[Texel],
@@ -150,12 +120,12 @@ impl RadianceCache<'_> {
 
     /// Adds the samples `gathered.samples..samples` of every replicate.
     pub fn gather(&self, texel: &Texel, gathered: &mut GatherSums, samples: u32, seed: u32) {
-        BATCHES.with_borrow_mut(|batches| self.gather_with(batches, texel, gathered, samples, seed));
+        WAVEFRONTS.with_borrow_mut(|wavefronts| self.gather_with(wavefronts, texel, gathered, samples, seed));
     }
 
     fn gather_with(
         &self,
-        batches: &mut Batches,
+        wavefronts: &mut Wavefronts,
         texel: &Texel,
         gathered: &mut GatherSums,
         samples: u32,
@@ -167,30 +137,30 @@ impl RadianceCache<'_> {
         });
         let tags =
             (0..REPLICATES).flat_map(|replicate| (first..samples).map(move |sample| (replicate, sample)));
-        batches.samples.count = 0;
+        wavefronts.samples.count = 0;
         for (replicate, sample) in tags {
             let [x, y, u, v] = sequences[replicate].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
                 let patch = self.patches.at(point.triangle, Side::Front, point.at);
                 let region = patch.and_then(|patch| self.guide.region_of(patch));
                 let request = GatherRequest { receiver: receiver(self.scene, &point), region, u, v };
-                batches.samples.push(request, (replicate, sample));
+                wavefronts.samples.push(request, (replicate, sample));
             }
-            if batches.samples.count == BATCH {
-                self.gather_batch(texel, &sequences, seed, batches, gathered);
+            if wavefronts.samples.count == WAVEFRONT {
+                self.gather_wavefront(texel, &sequences, seed, wavefronts, gathered);
             }
         }
-        self.gather_batch(texel, &sequences, seed, batches, gathered);
+        self.gather_wavefront(texel, &sequences, seed, wavefronts, gathered);
         gathered.samples = first.max(samples);
     }
 
-    /// Follows the samples of a batch, adds what they find to the sums, and empties the batch.
-    fn gather_batch(
+    /// Follows the samples of a wavefront, adds what they find to the sums, and empties it.
+    fn gather_wavefront(
         &self,
         texel: &Texel,
         sequences: &[TileSequence; REPLICATES],
         seed: u32,
-        Batches { samples, contributions, checks }: &mut Batches,
+        Wavefronts { samples, contributions, checks }: &mut Wavefronts,
         gathered: &mut GatherSums,
     ) {
         samples.follow(self);
@@ -202,7 +172,7 @@ impl RadianceCache<'_> {
             *contribution = GatherContribution {
                 light: incident.light,
                 weight: incident.weight,
-                ..GatherContribution::NONE
+                ..GatherContribution::default()
             };
             let Some(hit) = &mut incident.hit else { continue };
             if hit.is_steep {
@@ -284,8 +254,8 @@ impl RadianceCache<'_> {
             contribution.rays += 1;
             receiver = self.receiver_at(&last);
             let request = GatherRequest { receiver, region: None, u, v };
-            let mut incident = [IncidentSample::NOTHING];
-            self.incident(&[request], &mut [SamplePath::NONE], &mut incident);
+            let mut incident = [IncidentSample::default()];
+            self.incident(&[request], &mut [SamplePath::default()], &mut incident);
             let [incident] = incident;
             let Some(hit) = incident.hit else {
                 contribution.light = light + weight * incident.light;

@@ -33,22 +33,12 @@ impl Weights {
 }
 
 /// The brightest light that a sample brought although the guide would hardly have led there.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct UnguidedLight {
     /// The patch that it came from.
     pub patch: PatchIndex,
     /// What it added to the sums, W/m², mean of the channels; 0 if there was none.
     pub light: f32,
-}
-
-impl UnguidedLight {
-    pub const NONE: Self = Self { patch: PatchIndex(0), light: 0.0 };
-}
-
-impl Default for UnguidedLight {
-    fn default() -> Self {
-        Self::NONE
-    }
 }
 
 /// What a texel has gathered: sums for its irradiance by bounces.

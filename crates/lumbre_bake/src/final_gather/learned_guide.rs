@@ -41,7 +41,7 @@ pub(crate) fn learn(cache: &mut RadianceCache<'_>, texels: &[Texel], gathered: &
         cache.discoveries.extend(discovered.into_iter().map(discovery));
     }
     cache.discoveries.sort_by_key(|discovery| discovery.receiver);
-    gathered.par_iter_mut().for_each(|sums| sums.unguided = UnguidedLight::NONE);
+    gathered.par_iter_mut().for_each(|sums| sums.unguided = UnguidedLight::default());
     cache.guide = Cow::Owned(cache.guide_of_patches.with(&cache.discoveries));
 }
 
@@ -73,7 +73,7 @@ mod tests {
         let sums = |light: f32| GatherSums {
             sums: [Vec3::splat(8.0); REPLICATES],
             samples: 4,
-            unguided: UnguidedLight { light, ..UnguidedLight::NONE },
+            unguided: UnguidedLight { light, ..UnguidedLight::default() },
             ..GatherSums::default()
         };
         assert!(has_discovery(&sums(16.1)));

@@ -57,9 +57,6 @@ const CORRELATED_TEXELS: f32 = 4.5;
 
 impl<'a> RadianceCache<'a> {
     /// The cache before the first round: direct light of texels, light by bounces of patches.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn new(
         sources: &'a Sources<'a>,
         texels: &CoveredTexels<'a>,
@@ -120,9 +117,9 @@ impl RadianceCache<'_> {
         })
     }
 
-    /// The texel that shows a point of a surface; [`MapTexel::NONE`] on backs and outside the map.
-    pub(crate) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> MapTexel {
+    /// The texel that shows a point of a surface; `None` on backs and outside the map.
+    pub(crate) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> Option<MapTexel> {
         let texel = self.layout.texel_at(&self.scene.triangles[triangle as usize], at);
-        texel.filter(|_| side == Side::Front).unwrap_or(MapTexel::NONE)
+        texel.filter(|_| side == Side::Front)
     }
 }

@@ -85,9 +85,6 @@ impl IndirectLight {
 
 /// Gathers bounced light in rounds, starting with the sums `reused` from a previous bake. Afterwards the cache also
 /// holds the gathered light, for rays of later stages.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn gather(
     cache: &mut RadianceCache<'_>,
     texels: &CoveredTexels<'_>,

@@ -93,10 +93,10 @@ impl TexelRadiances {
         }
     }
 
-    /// What is known of a texel.
+    /// What is known of a texel, or of a point that no texel shows.
     #[inline]
-    pub fn at(&self, texel: MapTexel) -> &TexelRadiance {
-        self.0.get(texel.place()).unwrap_or(&TexelRadiance::UNKNOWN)
+    pub fn at(&self, texel: Option<MapTexel>) -> &TexelRadiance {
+        texel.map_or(&TexelRadiance::UNKNOWN, |texel| &self.0[texel.place()])
     }
 }
 

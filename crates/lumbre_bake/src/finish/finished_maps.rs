@@ -14,9 +14,6 @@ use crate::stage::Stage;
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// The objects of a scene with their finished maps. `points` are what the finished maps are compared with, to measure what their resolution costs.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn finished_maps(
     lit: &LitTexels<'_>,
     points: &[DensePoint],

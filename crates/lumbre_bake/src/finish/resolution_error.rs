@@ -51,9 +51,6 @@ pub(crate) struct DensePoint {
 
 /// The points that the finished map is compared with; none if the comparison is switched off, or the time is up.
 /// `cache` is `None` where nothing bounces.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn dense_points(
     sources: &Sources<'_>,
     cache: Option<&RadianceCache<'_>>,

@@ -17,9 +17,6 @@ const MAX_RAYS: u32 = 65_536;
 const LATE_RAYS: u32 = 16;
 
 /// Casts about `rays` rays, in proportion to the patches' areas. Returns the counts per patch, and the number of rays.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn cast(
     scene: &BakeScene,
     patches: &Patches,

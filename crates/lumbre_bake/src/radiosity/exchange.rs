@@ -59,9 +59,6 @@ impl Exchange {
     /// Returns the form factors as well, by which `rebake` estimates what changes since a former bake do to the light.
     /// `None` where nothing bounces; the report then says why. `known_direct` returns each patch's direct irradiance by
     /// two independent halves of samples, or `None` for patches of which it is not known: those cast shadow rays.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn new(
         scene: &BakeScene,
         sources: &Sources<'_>,

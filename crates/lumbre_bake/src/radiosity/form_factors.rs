@@ -42,9 +42,6 @@ pub(crate) struct FormFactors {
 impl FormFactors {
     /// Samples with about `rays` rays or lines. Returns the estimate from all of them and those from two halves: half
     /// the difference of these has the standard deviation of the error of the former.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn sample(
         scene: &BakeScene,
         patches: &Patches,

@@ -51,9 +51,6 @@ impl LineEnd {
 
 /// Casts as many lines as take about the time of `rays` rays. Returns the counts per patch, and the number of lines and
 /// of the rays from small patches together.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn cast(
     scene: &BakeScene,
     patches: &Patches,

@@ -47,9 +47,6 @@ const TOLERANCE: f64 = 1e-4;
 
 /// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The report counts about how many rays
 /// it took to decide.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 #[expect(
     clippy::too_many_arguments,
     reason = "the light of three stages, and the frame that every stage takes"

@@ -119,7 +119,7 @@ impl GatherSums {
         let count = self.samples as f32;
         let sums = self.estimates().map(|estimate| estimate * count);
         let weights = sums.map(|sum| Weights::of_equal(sum, self.samples));
-        Self { sums, weights, rays: 0, unguided: UnguidedLight::NONE, ..*self }
+        Self { sums, weights, rays: 0, unguided: UnguidedLight::default(), ..*self }
     }
 }
 

@@ -47,6 +47,6 @@ pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
         nearness,
         samples,
         rays: 0,
-        unguided: UnguidedLight::NONE,
+        unguided: UnguidedLight::default(),
     })
 }

@@ -16,6 +16,7 @@ pub(crate) mod light_tree;
 pub(crate) mod punctual;
 pub(crate) mod punctual_irradiance;
 pub(crate) mod receiver_quadrature;
+pub(crate) mod sampled_receiver;
 pub(crate) mod share_variance;
 pub(crate) mod shared_samples;
 pub(crate) mod source_tree;

@@ -8,6 +8,7 @@ use lumbre_optics::BakeMode;
 use super::emitter_walk::EmitterChoice;
 use super::light_cut::{Branch, SharedSources};
 use super::punctual::{self, FIRST_ID};
+use super::sampled_receiver::SurfacePoints;
 use crate::color::channel_mean;
 use crate::sampling::Sequence;
 use crate::scene::Receiver;
@@ -92,7 +93,7 @@ impl Sources<'_> {
         shared: &SharedSources,
         sequence: Sequence,
         samples: u32,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        point: &impl SurfacePoints,
         direct: &mut Direct,
     ) {
         if shared.is_empty() {

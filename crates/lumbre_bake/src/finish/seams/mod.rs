@@ -58,9 +58,6 @@ struct Closed {
 
 /// Closes the seams of the maps, unless that is switched off, and reports the outcome. How far a texel is moved is
 /// added to its error.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn close_seams(
     maps: &Maps<'_>,
     shown: MapValues<'_>,

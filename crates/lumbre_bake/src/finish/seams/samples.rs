@@ -28,7 +28,7 @@ const SAME_READING: f32 = 1e-3;
 const NEGLIGIBLE: f32 = 1.0 / 1024.0;
 
 /// What bilinear filtering reads at a point: four texels and their weights.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Reading {
     pub texels: [MapTexel; 4],
     /// Each in [0, 1]; their sum is 1.
@@ -153,7 +153,7 @@ impl Sampling<'_> {
         let at = uv - 0.5;
         let low = at.floor();
         let fraction = at - low;
-        let mut reading = Reading { texels: [MapTexel::NONE; 4], weights: [0.0; 4] };
+        let mut reading = Reading::default();
         let mut sum = 0.0;
         for corner in 0..4 {
             let step = Vec2::new((corner % 2) as f32, (corner / 2) as f32);
