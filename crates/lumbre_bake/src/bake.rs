@@ -235,7 +235,7 @@ fn run(
 ) -> Result<BakeOutput, BakeError> {
     let options = request.options;
     monitor.stage(Stage::Layout, report)?;
-    let mut reuse = request.prepare_reuse(input, monitor, report)?;
+    let reuse = request.prepare_reuse(input, monitor, report)?;
     if input.objects.is_empty() {
         return Ok(nothing_to_bake("the scene has no static mesh", report));
     }
@@ -256,14 +256,13 @@ fn run(
     let texels = CoveredTexels::new(&scene, &layout, monitor, report)?;
     let is_time_short = monitor.clock().is_past(SHORT_OF_TIME);
     let patch_options = options.for_patches(decide(monitor, is_time_short)?);
-    let resolution = monitor.run_interruptible(1.0, || {
-        memory::resolution(&scene, &texels, sample_bytes, &patch_options, report)
-    })??;
+    let resolution = monitor
+        .run_interruptible(1.0, || memory::resolution(&texels, sample_bytes, &patch_options, report))??;
     let changes = monitor.run_interruptible(1.0, || reuse.changes(&input.objects, &sources, &texels))?;
     let known = changes.as_ref().map_or(&[][..], |changes| &changes.known_direct);
     let direct = direct_light(&sources, &texels, known, options, monitor, report)?;
 
-    let patch_light = |patches: &Patches| patch_light(&scene, &texels, &direct, patches);
+    let patch_light = |patches: &Patches| patch_light(&texels, &direct, patches);
     let exchange = Exchange::new(&scene, &sources, &patch_options, resolution, patch_light, monitor, report)?;
     let reused = match (&exchange, &changes) {
         (Some((exchange, factors)), Some(changes)) => {
@@ -288,8 +287,7 @@ fn run(
 
     monitor.stage(Stage::Texels, report)?;
     let light = indirect.with(&direct);
-    let lit =
-        LitTexels { scene: &scene, texels: &texels, direct: &direct, indirect: &indirect, light: &light };
+    let lit = LitTexels { texels: &texels, direct: &direct, indirect: &indirect, light: &light };
     summary::write(&lit, cache.is_some(), &input.objects, options, monitor, report)?;
     report.rebake = report.rebake.take().or_else(|| {
         changes.as_ref().map(|changes| rebake_report(changes, &texels.list, reused.as_ref(), report))

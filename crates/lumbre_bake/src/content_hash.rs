@@ -2,7 +2,9 @@
 //! its objects have changed, and they keep a checkpoint from being resumed by another bake. What the result does not
 //! depend on is left out, such as cameras, specular reflection and the number of threads.
 //!
-//! Structures are destructured without `..`, so that whoever adds a field has to decide here whether the bake reads it.
+//! Options, lights and materials are hashed as their debugging text, in which every number can be read back exactly, with
+//! what does not matter set to a default: a field that is added to them counts until it is set to a default here. Other
+//! structures are destructured without `..`, so that whoever adds a field has to decide here whether the bake reads it.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -11,12 +13,12 @@ use std::sync::Arc;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{AlphaMode, Attenuation, Light, Material, SpotCone, Surface};
+use lumbre_optics::{AlphaMode, Light, Material, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 use serde::{Deserialize, Serialize};
 
 use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, from_world};
-use crate::{BakeError, BakeOptions, Density};
+use crate::{BakeError, BakeOptions};
 
 /// The version of the baker: that of the crate, and a hash of its sources and of the crates that influence a baked
 /// file.
@@ -91,7 +93,7 @@ pub(crate) fn hashes_of(input: &StaticScene, options: &BakeOptions) -> Hashes {
     let mut hasher = Hasher::new("sampling");
     // Options that do not influence samples are set to their defaults.
     let default = BakeOptions::default();
-    hasher.options(&BakeOptions {
+    hasher.options(BakeOptions {
         atlas_size: default.atlas_size,
         seams: default.seams,
         resolution_error: default.resolution_error,
@@ -102,8 +104,9 @@ pub(crate) fn hashes_of(input: &StaticScene, options: &BakeOptions) -> Hashes {
         ..*options
     });
     let sampling = hasher.finish();
+
     let mut hasher = Hasher::new("lumbre bake");
-    hasher.options(options);
+    hasher.options(*options);
     hasher.number(objects.len() as u64);
     for hash in &object_hashes {
         hasher.hashes(&[*hash]);
@@ -157,37 +160,10 @@ fn object_hash(object: &SceneObject, images: &mut Images) -> ContentHash {
 fn light_hash(placed: &PlacedLight) -> ContentHash {
     let PlacedLight { light, position, axis } = placed;
     // Disabled lights are not in the list. Specular and ambient terms and shadow maps are used only in real time.
-    let Light {
-        kind,
-        ambient: _,
-        diffuse,
-        specular: _,
-        attenuation,
-        spot,
-        enabled: _,
-        shadow: _,
-        bake,
-        radius,
-        angle,
-    } = light;
-    let Attenuation { constant, linear, quadratic, clamp, range } = *attenuation;
+    let unused = Vec3::ZERO;
+    let baked = Light { ambient: unused, specular: unused, enabled: true, shadow: false, ..light.clone() };
     let mut hasher = Hasher::new("light");
-    hasher.number(*kind as u64);
-    hasher.number(*bake as u64);
-    hasher.color(diffuse);
-    hasher.floats(&[constant, linear, quadratic, range, *radius, *angle]);
-    hasher.number(clamp.into());
-    match *spot {
-        None => hasher.number(0),
-        Some(SpotCone::Exponent { cutoff, exponent }) => {
-            hasher.number(1);
-            hasher.floats(&[cutoff, exponent]);
-        }
-        Some(SpotCone::Smooth { inner, outer }) => {
-            hasher.number(2);
-            hasher.floats(&[inner, outer]);
-        }
-    }
+    hasher.text(&baked);
     hasher.doubles(&position.to_array());
     hasher.doubles(&axis.to_array());
     hasher.finish()
@@ -234,10 +210,6 @@ impl Hasher {
 
     fn number(&mut self, value: u64) {
         self.0.update(&value.to_le_bytes());
-    }
-
-    fn numbers<const N: usize>(&mut self, values: [u64; N]) {
-        values.into_iter().for_each(|value| self.number(value));
     }
 
     fn floats(&mut self, values: &[f32]) {
@@ -287,45 +259,15 @@ impl Hasher {
         self.0.update(&block);
     }
 
-    fn options(&mut self, options: &BakeOptions) {
+    /// The debugging text of a value.
+    fn text(&mut self, value: &impl fmt::Debug) {
+        self.bytes(format!("{value:?}").as_bytes());
+    }
+
+    fn options(&mut self, options: BakeOptions) {
         // The result does not depend on the number of threads, nor on the time limit unless it cuts the bake short.
-        let BakeOptions {
-            density,
-            atlas_size,
-            error,
-            time: _,
-            quality,
-            patch_texels,
-            gap,
-            seed,
-            threads: _,
-            form_factors,
-            solver,
-            denoise,
-            seams,
-            resolution_error,
-            probes,
-            probe_spacing,
-            separate_light,
-            memory,
-        } = *options;
-        match density {
-            Density::Automatic => self.number(0),
-            Density::TexelsPerMeter(density) => {
-                self.number(1);
-                self.doubles(&[density]);
-            }
-            Density::MapSize(side) => self.numbers([2, side.into()]),
-        }
-        self.doubles(&[error]);
-        self.number(quality as u64);
-        self.doubles(&[patch_texels.map_or(0.0, f64::from)]);
-        self.numbers([gap.into(), seed.into(), form_factors as u64, solver as u64, denoise.into()]);
-        self.numbers([memory.unwrap_or(u64::MAX), atlas_size.map_or(0, u64::from), seams.into()]);
         // `resolution_error` does not change the map, but the report, which is stored with the map.
-        self.numbers([resolution_error.into(), probes as u64]);
-        self.doubles(&[probe_spacing.unwrap_or(0.0)]);
-        self.number(separate_light.into());
+        self.text(&BakeOptions { threads: None, time: None, ..options });
     }
 
     fn mesh(&mut self, mesh: &TriangleMesh) {
@@ -341,41 +283,26 @@ impl Hasher {
 
     fn material(&mut self, material: &Material) {
         // Diffuse reflection, emission and opacity are baked; specular reflection, mirrors and refraction are not.
-        let Material {
-            front,
-            back,
-            alpha,
-            alpha_mode,
-            double_sided,
-            unlit,
-            mirror: _,
-            transmission: _,
-            ior: _,
-            lobe: _,
-            distribution: _,
-            fresnel: _,
-        } = material;
-        self.surface(front);
-        self.option(back.as_ref(), Self::surface);
-        match *alpha_mode {
+        let unused = Material::default();
+        let surface = |surface: &Surface| Surface {
+            ambient: unused.front.ambient,
+            specular: unused.front.specular,
+            shininess: unused.front.shininess,
+            ..*surface
+        };
+        self.text(&Material {
+            front: surface(&material.front),
+            back: material.back.as_ref().map(surface),
             // Opaque materials ignore their alpha.
-            AlphaMode::Opaque => self.number(0),
-            AlphaMode::Mask { cutoff } => {
-                self.number(1);
-                self.floats(&[*alpha, cutoff]);
-            }
-            AlphaMode::Blend => {
-                self.number(2);
-                self.floats(&[*alpha]);
-            }
-        }
-        self.numbers([(*double_sided).into(), (*unlit).into()]);
-    }
-
-    fn surface(&mut self, surface: &Surface) {
-        let Surface { ambient: _, diffuse, specular: _, emission, shininess: _ } = surface;
-        self.color(diffuse);
-        self.color(emission);
+            alpha: if material.alpha_mode == AlphaMode::Opaque { unused.alpha } else { material.alpha },
+            mirror: unused.mirror,
+            transmission: unused.transmission,
+            ior: unused.ior,
+            lobe: unused.lobe,
+            distribution: unused.distribution,
+            fresnel: unused.fresnel,
+            ..material.clone()
+        });
     }
 
     fn textures(&mut self, textures: &MaterialTextures, images: &mut Images) {
@@ -399,7 +326,7 @@ impl Hasher {
         let hash = images.hash(image);
         self.hashes(&[hash]);
         // The baker always filters bilinearly, so only the sampler's wrap modes count.
-        self.numbers([sampler.wrap_u as u64, sampler.wrap_v as u64, (*tex_coord).into()]);
+        self.text(&(sampler.wrap_u, sampler.wrap_v, tex_coord));
         self.floats(&[offset.x, offset.y, *rotation, scale.x, scale.y]);
     }
 }

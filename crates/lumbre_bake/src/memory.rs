@@ -118,14 +118,13 @@ pub(crate) fn check_texels(
 /// # Errors
 /// [`BakeError::Memory`] if even the coarsest resolution does not fit.
 pub(crate) fn resolution(
-    scene: &BakeScene,
     texels: &CoveredTexels<'_>,
     sample_bytes: u64,
     options: &BakeOptions,
     report: &mut BakeReport,
 ) -> Result<Resolution, BakeError> {
     let effort = options.effort();
-    let CoveredTexels { layout, list: texels, contacts, side: texel_side, .. } = texels;
+    let CoveredTexels { scene, layout, list: texels, contacts, side: texel_side, .. } = texels;
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let requested_rays = effort.form_factor_rays(texels.len(), options.error);

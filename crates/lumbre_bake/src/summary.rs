@@ -44,7 +44,7 @@ pub(crate) fn write(
     monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<(), BakeError> {
-    let LitTexels { scene, texels, direct, indirect, light } = *lit;
+    let LitTexels { texels, direct, indirect, light } = *lit;
     let (list, errors) = (&texels.list, &indirect.variances);
     report.mean_irradiance = mean_irradiance(list, light).to_array();
     if !bounces {
@@ -57,8 +57,8 @@ pub(crate) fn write(
         report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
     }
     let (squared_errors, whole) = (direct.local.relative(&errors.expected), report.estimated_error);
-    report.worst =
-        monitor.run_interruptible(0.0, || worst_places(scene, objects, list, &squared_errors, whole))?;
+    report.worst = monitor
+        .run_interruptible(0.0, || worst_places(texels.scene, objects, list, &squared_errors, whole))?;
     Ok(())
 }
 

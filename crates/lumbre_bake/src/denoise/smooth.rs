@@ -48,10 +48,11 @@ pub(crate) fn smooth(
     });
     smooth_rows(grid, nearness, &mut smoothed);
     let values = neighbourhoods.read(&smoothed).into_par_iter();
-    let results = values.zip(neighbourhoods.texels).zip(estimates).map(|((values, texel), estimates)| {
-        let smoothed = std::array::from_fn(|replicate| Vec3::from_slice(&values[3 * replicate..]));
-        if texel.is_hidden() { (*estimates, 0.0) } else { (smoothed, values[BIAS]) }
-    });
+    let results =
+        values.zip(&neighbourhoods.texels.list).zip(estimates).map(|((values, texel), estimates)| {
+            let smoothed = std::array::from_fn(|replicate| Vec3::from_slice(&values[3 * replicate..]));
+            if texel.is_hidden() { (*estimates, 0.0) } else { (smoothed, values[BIAS]) }
+        });
     let (mut smoothed, biases): (Vec<Estimates>, Vec<f32>) = results.unzip();
     conserve_light(&neighbourhoods.texel_charts, estimates, &mut smoothed);
     (smoothed, biases)

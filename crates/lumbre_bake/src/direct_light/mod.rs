@@ -48,7 +48,7 @@ impl DirectLight {
     /// Irradiance (mixed lights included) per texel of all maps; NaN where no surface is in the open.
     pub fn by_place(&self, texels: &CoveredTexels<'_>) -> Vec<Vec3> {
         let mut total = vec![Vec3::NAN; texels.layout.texels];
-        for (covered, texel) in open_texels(&texels.list) {
+        for (covered, texel) in texels.open() {
             total[texel.index.place()] = self.texels[covered.place()].total();
         }
         total
@@ -71,7 +71,8 @@ pub(crate) fn direct_light(
     let mut shared = sampler.shared_light(monitor)?;
     let so_far = shared.as_ref().map(|shared| shared.with(&direct));
     monitor.pass(PASS_OF_LOCAL_LIGHT);
-    let local = LocalLight::new(sources, texels, so_far.as_ref().unwrap_or(&direct), monitor)?;
+    let so_far = so_far.as_deref().unwrap_or(&direct);
+    let local = LocalLight::new(sources, texels, &sampler.cuts.blocks, so_far, monitor)?;
     let mut doubtful = sampler.doubtful_texels(&direct);
     let mut seconds_of_last_goal = 0.0;
     for (step, error) in error_goals(options).into_iter().enumerate() {
@@ -125,11 +126,10 @@ impl<'a> SourceSampler<'a> {
         options: &'a BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
-        let list = &texels.list;
-        let mut cuts = monitor.run_interruptible(1.0, || LightCuts::new(sources, list, &texels.charts))?;
+        let mut cuts = monitor.run_interruptible(1.0, || LightCuts::new(sources, texels))?;
         let is_wanted = |texel: CoveredTexel| known_light(known, texel).is_none();
         let shafts =
-            monitor.run_interruptible(1.0, || Shafts::new(sources.scene, sources, list, &cuts, is_wanted))?;
+            monitor.run_interruptible(1.0, || Shafts::new(sources, &texels.list, &cuts, is_wanted))?;
         // Where shadow rays would be needed anyway, one ray to any of the sources is worth as much as one to each of
         // them. Not so where all lamps have samples of their own: the unoccluded sum over them is exact, and rays only
         // find the visible share of it.
@@ -237,12 +237,11 @@ impl<'a> SourceSampler<'a> {
         if !self.cuts.share_samples() {
             return Ok(None);
         }
-        let CoveredTexels { layout, list, charts, .. } = self.texels;
         let is_wanted = |place: usize| self.is_wanted(CoveredTexel::new(place));
         // Texels with known light have no shared samples, so the others must not be compared with them.
         let keys = self.cuts.keys().into_iter().enumerate();
         let groups: Vec<u32> = keys.map(|(place, key)| 2 * key + u32::from(is_wanted(place))).collect();
-        let neighbourhoods = Neighbourhoods::new(self.sources.scene, layout, list, charts, &groups);
+        let neighbourhoods = Neighbourhoods::new(self.texels, &groups);
         monitor.pass(PASS);
         let shared =
             SharedLight::new(self.sources, neighbourhoods, &self.cuts, is_wanted, self.options, monitor)?;
@@ -381,7 +380,7 @@ impl ErrorGoals {
         options: &BakeOptions,
         has_shared: bool,
     ) -> Self {
-        let open = open_texels(&texels.list).count().max(1) as f64;
+        let open = texels.open().count().max(1) as f64;
         let total = open * options.error.powi(2);
         let has_gather = sources.scene.surfaces.iter().any(|surface| !surface.is_black());
         // Shared samples are mostly cheaper than rays of the gather, so that direct light is held to a smaller share of

@@ -50,12 +50,12 @@ pub(crate) struct Shafts<'a> {
 impl<'a> Shafts<'a> {
     /// Collects the occluders for all tiles of covered texels with a texel that is wanted.
     pub fn new(
-        scene: &'a BakeScene,
         sources: &'a Sources<'a>,
         texels: &[Texel],
         cuts: &LightCuts,
         wanted: impl Fn(CoveredTexel) -> bool + Sync,
     ) -> Self {
+        let scene = sources.scene;
         let mut shafts = Self { scene, sources, tiles: Vec::new(), tile_of: Vec::new() };
         if sources.emitters.is_empty() && sources.lights.is_empty() {
             return shafts;

@@ -127,7 +127,7 @@ impl<'a> SharedLight<'a> {
         options: &'a BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
-        let texels = neighbourhoods.texels;
+        let texels = &neighbourhoods.texels.list;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
         let (sums, smoothed) = (Vec::new(), SmoothedLight::default());
         let mut light = Self { sources, texels, cuts, neighbourhoods, options, first, most, sums, smoothed };

@@ -11,11 +11,10 @@ use super::patch_fallback::{from_patches, knows_nothing};
 use super::radiance_cache::RadianceCache;
 use crate::chunks::decide;
 use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::open_texels;
 use crate::denoise::replicates::{mean, variance};
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::SampleAllocation;
-use crate::texel_index::CoveredTexel;
+use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::{BakeError, BakeOptions};
 
 /// An evaluation takes about as much time as so many samples, per replicate, of every texel: 0.5 to 0.8 in the demo level,
@@ -53,7 +52,7 @@ pub(crate) fn cast_first_round(
         one_each.partition(|allocation| representatives[allocation.texel.place()] == allocation.texel);
     // How many samples of every wanted texel there is time for, besides the evaluation that follows, which is one of all
     // texels.
-    let open = open_texels(list).count() as f64;
+    let open = texels.open().count() as f64;
     let samples_of_evaluation = SAMPLES_PER_EVALUATION * open / wanted.len() as f64;
     let samples_left = |cast: usize, monitor: &BakeMonitor<'_>| {
         let seconds = (monitor.seconds() - begun).max(1e-6) * wanted.len() as f64 / cast.max(1) as f64;
@@ -90,23 +89,18 @@ pub(crate) fn cast_first_round(
 /// For each texel, the first one of its block if both are open, of the same chart and not divided by a wall; otherwise
 /// the texel itself.
 fn representatives(texels: &CoveredTexels<'_>) -> Vec<CoveredTexel> {
-    let mut places = vec![None; texels.layout.texels];
-    for (place, texel) in open_texels(&texels.list) {
-        places[texel.index.place()] = Some(place);
-    }
-    for texel in &texels.divided {
-        places[texels.list[texel.place()].index.place()] = None;
-    }
+    let is_whole = |texel: &CoveredTexel| texels.divided.binary_search(texel).is_err();
+    let whole_at = |place: MapTexel| texels.open_at(place).filter(is_whole);
     let chart = |place: CoveredTexel| texels.charts[texels.list[place.place()].triangle as usize];
     CoveredTexel::all(texels.list.len())
         .map(|place| {
             let texel = &texels.list[place.place()];
-            if places[texel.index.place()].is_none() {
+            if whole_at(texel.index).is_none() {
                 return place;
             }
             let map = &texels.layout.maps[texel.object as usize];
             let corner = map.texel(texel.x / BLOCK * BLOCK, texel.y / BLOCK * BLOCK);
-            places[corner.place()].filter(|&corner| chart(corner) == chart(place)).unwrap_or(place)
+            whole_at(corner).filter(|&corner| chart(corner) == chart(place)).unwrap_or(place)
         })
         .collect()
 }

@@ -72,9 +72,7 @@ impl<'a> RadianceCache<'a> {
         for texel in &texels.divided {
             direct_by_place[texels.list[texel.place()].index.place()] = Vec3::NAN;
         }
-        let reflectance = monitor.run_interruptible(0.0, || {
-            mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list)
-        })?;
+        let reflectance = monitor.run_interruptible(0.0, || mean_reflectances(texels, &exchange.patches))?;
         Ok(Self {
             correlation_radius: CORRELATED_TEXELS * texels.side,
             texels: TexelRadiances::new(&direct_by_place, &steep, &reflectance),

@@ -96,9 +96,7 @@ pub(crate) fn gather(
 ) -> Result<IndirectLight, BakeError> {
     let list = &texels.list;
     let leaked_before = cache.scene.leaks.count();
-    let neighbourhoods = monitor.run_interruptible(0.0, || {
-        Neighbourhoods::new(cache.scene, texels.layout, list, &texels.charts, &[])
-    })?;
+    let neighbourhoods = monitor.run_interruptible(0.0, || Neighbourhoods::new(texels, &[]))?;
     let planner = RoundPlanner::new(&neighbourhoods, texels, direct, reused, options);
     let no_sums = || vec![GatherSums::default(); list.len()];
     let mut gathered = reused.map_or_else(no_sums, |reused| reused.gathered.clone());

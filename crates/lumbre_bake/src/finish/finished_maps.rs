@@ -5,7 +5,7 @@ use super::baked_maps::{BakedMap, BakedObject, FilledTexels, baked_objects};
 use super::fill::fill;
 use super::pages::Pages;
 use super::resolution_error::{DensePoint, compare};
-use super::seams::{MapValues, Maps, close_seams};
+use super::seams::{MapValues, close_seams};
 use super::separate_light::separate;
 use crate::final_gather::lit_texels::LitTexels;
 use crate::monitor::BakeMonitor;
@@ -22,37 +22,30 @@ pub(crate) fn finished_maps(
     monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<(Vec<BakedObject>, Vec<BakedMap>), BakeError> {
-    let LitTexels { scene, texels, .. } = *lit;
-    let layout = texels.layout;
+    let texels = lit.texels;
     monitor.advance(0.2)?;
     let light_and_errors = (lit.light, lit.indirect.variances.cautious.as_slice());
     let (mut irradiance, mut variances) =
-        monitor.run_interruptible(0.2, || fill(texels, light_and_errors, options.gap, &scene.stop))?;
+        monitor.run_interruptible(0.2, || fill(texels, light_and_errors, options.gap))?;
     monitor.advance(1.0)?;
 
     monitor.stage(Stage::Seams, report)?;
-    let maps = Maps {
-        scene,
-        layout,
-        texels: &texels.list,
-        charts: &texels.charts,
-        mean: report.mean_irradiance.iter().sum::<f64>() / 3.0,
-    };
+    let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
     let values = MapValues { light: &mut irradiance, variances: &mut variances };
-    close_seams(&maps, values, options, monitor, report)?;
+    close_seams(texels, mean, values, options, monitor, report)?;
     monitor.advance(0.9)?;
     report.resolution =
-        monitor.run_interruptible(0.9, || compare(scene, layout, &irradiance, &variances, points))?;
-    let pages = monitor.run_interruptible(0.9, || Pages::new(layout, options.atlas_size, options.gap))?;
+        monitor.run_interruptible(0.9, || compare(texels, &irradiance, &variances, points))?;
+    let pages =
+        monitor.run_interruptible(0.9, || Pages::new(texels.layout, options.atlas_size, options.gap))?;
     report.atlases = pages.pages.len();
     report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
     let separate = monitor.run_interruptible(1.0, || {
-        options
-            .separate_light
-            .then(|| separate(texels, (lit.direct, lit.indirect), &irradiance, options.gap, &scene.stop))
+        options.separate_light.then(|| separate(texels, (lit.direct, lit.indirect), &irradiance, options.gap))
     })?;
     let filled = FilledTexels { irradiance: &irradiance, variances: &variances, separate: separate.as_ref() };
-    let finished = monitor.run_interruptible(1.0, || baked_objects(objects, layout, &filled, &pages))?;
+    let finished =
+        monitor.run_interruptible(1.0, || baked_objects(objects, texels.layout, &filled, &pages))?;
     monitor.advance(1.0)?;
     Ok(finished)
 }

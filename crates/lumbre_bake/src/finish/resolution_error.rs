@@ -8,6 +8,7 @@ use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::chunks::in_chunks;
+use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Footprint, FootprintPoint, Texel, receiver};
 use crate::denoise::replicates::REPLICATES;
 use crate::final_gather::gather_sums::GatherSums;
@@ -15,8 +16,7 @@ use crate::final_gather::radiance_cache::RadianceCache;
 use crate::monitor::BakeMonitor;
 use crate::report::ResolutionReport;
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
-use crate::scene::Receiver;
-use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::scene::{BakeScene, Receiver, SurfaceHit};
 use crate::sources::light_sources::Sources;
 use crate::stage::Stage;
 use crate::texel_index::MapTexel;
@@ -156,8 +156,7 @@ impl PointBaker<'_> {
 /// Compares the finished map with the points. `variances` is the map's own estimate of its squared sampling error, per
 /// texel; NaN where nothing is known.
 pub(crate) fn compare(
-    scene: &BakeScene,
-    layout: &LightmapLayout,
+    texels: &CoveredTexels<'_>,
     filled: &[Vec3],
     variances: &[f32],
     points: &[DensePoint],
@@ -174,7 +173,7 @@ pub(crate) fn compare(
     let excess = if excess.is_finite() { excess } else { Vec3::ZERO };
     let (mut mean, mut squares) = (0.0, Vec::with_capacity(points.len()));
     for point in counting() {
-        let Some((shown, variance)) = look_up(scene, layout, filled, variances, point) else { continue };
+        let Some((shown, variance)) = look_up(texels, filled, variances, point) else { continue };
         let light = [0, 1].map(|half| point.direct[half] + point.indirect[half] * (Vec3::ONE - excess));
         let [a, b] = light.map(|light| (light - shown).as_dvec3());
         squares.push((a * b).element_sum() / 3.0 - f64::from(variance));
@@ -197,14 +196,13 @@ pub(crate) fn compare(
 /// What the map shows at a point by bilinear filtering, and the variance of that, as if the texels' errors were
 /// independent.
 fn look_up(
-    scene: &BakeScene,
-    layout: &LightmapLayout,
+    texels: &CoveredTexels<'_>,
     filled: &[Vec3],
     variances: &[f32],
     point: &DensePoint,
 ) -> Option<(Vec3, f32)> {
-    let triangle = &scene.triangles[point.triangle as usize];
-    let map = &layout.maps[triangle.object as usize];
+    let triangle = &texels.scene.triangles[point.triangle as usize];
+    let map = &texels.layout.maps[triangle.object as usize];
     let at = triangle.place_on_map(point.at) - 0.5;
     if !at.is_finite() {
         return None;

@@ -19,7 +19,6 @@ const MIN_TEXELS: f64 = 2.0;
 /// chessboard. `None` where there are too few texels. Texels that walls divide are left out, since they hold the light
 /// of both sides of the wall.
 pub(crate) fn patch_light(
-    scene: &BakeScene,
     texels: &CoveredTexels<'_>,
     direct: &DirectLight,
     patches: &Patches,
@@ -30,7 +29,7 @@ pub(crate) fn patch_light(
     let undivided = texels.list.iter().zip(&direct.texels).zip(divided).filter(|(_, divided)| !divided);
     for ((texel, direct), _) in undivided {
         let (half, light) = (((texel.x + texel.y) & 1) as usize, direct.total().as_dvec3());
-        for_each_point(scene, texel, |triangle, at, share| {
+        for_each_point(texels.scene, texel, |triangle, at, share| {
             if let Some(patch) = patches.at(triangle, Side::Front, at) {
                 let (sum, weight) = &mut sums[patch.place()][half];
                 *sum += light * share;
@@ -112,7 +111,7 @@ mod tests {
         let texels = CoveredTexels::new(&scene, &layout, &mut monitor, &mut report).unwrap();
         let direct = direct_light(&sources, &texels, &[], &options, &mut monitor, &mut report).unwrap();
         let patches = Patches::new(&scene, 6.0 * texels.side);
-        let light = patch_light(&scene, &texels, &direct, &patches);
+        let light = patch_light(&texels, &direct, &patches);
 
         let (mut known, mut squares, mut sum) = (0.0, 0.0, 0.0);
         for (index, (patch, light)) in patches.list.iter().zip(&light).enumerate() {

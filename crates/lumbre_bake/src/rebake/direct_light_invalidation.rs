@@ -9,7 +9,8 @@ use lumbre_optics::LightKind;
 use rayon::prelude::*;
 
 use super::changed_box::ChangedBox;
-use crate::coverage::footprint::{Texel, receiver};
+use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::footprint::receiver;
 use crate::coverage::texel_geometry::positions_of;
 use crate::coverage::texel_groups::TexelGroups;
 use crate::scene::{Canonical, PlacedLight};
@@ -81,21 +82,15 @@ impl ShadowVolumes {
 }
 
 /// Per covered texel, whether a box may block light that reaches it, or may have blocked it.
-pub(crate) fn shadowed(
-    sources: &Sources<'_>,
-    texels: &[Texel],
-    charts: &[u32],
-    boxes: &[ChangedBox],
-) -> Vec<bool> {
-    let scene = sources.scene;
-    let volumes = ShadowVolumes::new(sources, boxes);
-    let blocks = TexelGroups::blocks(texels, charts, BLOCK);
+pub(crate) fn shadowed(texels: &CoveredTexels<'_>, volumes: &ShadowVolumes) -> Vec<bool> {
+    let CoveredTexels { scene, list, charts, .. } = texels;
+    let blocks = TexelGroups::blocks(list, charts, BLOCK);
     let is_shadowed: Vec<bool> = blocks
         .members
         .par_iter()
         .map(|members| {
             let mut points = Vec::new();
-            for texel in members.iter().map(|member| &texels[member.place()]) {
+            for texel in members.iter().map(|member| &list[member.place()]) {
                 positions_of(scene, texel, &mut points);
                 if !scene.triangles[texel.triangle as usize].flat {
                     // Light is computed at points of the smooth surface, which lies above the facets, most of all in

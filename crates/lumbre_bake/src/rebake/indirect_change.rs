@@ -14,7 +14,6 @@ use rayon::prelude::*;
 use super::changed_box::ChangedBox;
 use super::changes::Changes;
 use super::choice;
-use super::direct_light_invalidation::ShadowVolumes;
 use super::estimate::{Estimate, Range, cone_to_sphere, direction_in_cone};
 use crate::chunks::in_chunks;
 use crate::coverage::covered_texels::CoveredTexels;
@@ -29,11 +28,11 @@ use crate::radiosity::form_factors::FormFactors;
 use crate::radiosity::patches::{Patch, Patches};
 use crate::radiosity::solution::gather;
 use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
-use crate::scene::Receiver;
 use crate::scene::material::Side;
-use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::scene::{BakeScene, Receiver, SurfaceHit};
 use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
+use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// Rays from a patch or from a block of texels. Every other one is aimed at what has changed.
@@ -72,7 +71,7 @@ pub(crate) fn reused_gather(
     };
     let of_patches = change.of_patches(light, factors, options, monitor)?;
     let light = PatchLight { change: &of_patches, ..light };
-    let reused = change.keep(light, &texels.list, &direct.local, options, monitor)?;
+    let reused = change.keep(light, &direct.local, options, monitor)?;
     report.rays += change.rays(&of_patches);
     Ok(reused)
 }
@@ -80,7 +79,7 @@ pub(crate) fn reused_gather(
 /// The light before and after, as far as the estimate needs it.
 struct IndirectChange<'a> {
     scene: &'a BakeScene,
-    layout: &'a LightmapLayout,
+    texels: &'a CoveredTexels<'a>,
     changes: &'a Changes<'a>,
     blocks: TexelGroups,
     /// Per texel of all maps, the change of direct light (mixed lights included), W/m².
@@ -89,7 +88,6 @@ struct IndirectChange<'a> {
     sky: Vec3,
     /// Bounding spheres of the changed boxes: centre and radius.
     spheres: Vec<(Vec3, f32)>,
-    shadow_volumes: ShadowVolumes,
 }
 
 /// The light that leaves the patches in the new scene, and the change of their irradiance by bounces.
@@ -109,25 +107,23 @@ impl<'a> IndirectChange<'a> {
     fn new(
         sources: &Sources<'a>,
         changes: &'a Changes<'a>,
-        texels: &CoveredTexels<'a>,
+        texels: &'a CoveredTexels<'a>,
         direct: &[Direct],
     ) -> Self {
-        let CoveredTexels { layout, list: texels, charts, .. } = texels;
-        let mut change = vec![Vec3::ZERO; layout.texels];
-        for ((texel, now), known) in texels.iter().zip(direct).zip(&changes.known) {
+        let mut change = vec![Vec3::ZERO; texels.layout.texels];
+        for ((texel, now), known) in texels.list.iter().zip(direct).zip(&changes.known) {
             if let Some(known) = known {
                 change[texel.index.place()] = now.total() - known.direct.total();
             }
         }
         Self {
             scene: sources.scene,
-            layout,
+            texels,
             changes,
-            blocks: TexelGroups::blocks(texels, charts, BLOCK),
+            blocks: TexelGroups::blocks(&texels.list, &texels.charts, BLOCK),
             direct: change,
             sky: sources.sky,
             spheres: changes.boxes.iter().map(|b| (b.center(), b.radius())).collect(),
-            shadow_volumes: ShadowVolumes::new(sources, &changes.boxes),
         }
     }
 
@@ -204,7 +200,7 @@ impl<'a> IndirectChange<'a> {
             patch.side == Side::Back
                 && patch.reflectance != Vec3::ZERO
                 && (self.changes.lights_changed
-                    || self.shadow_volumes.cross(&patches.corners(self.scene, patch)))
+                    || self.changes.shadow_volumes.cross(&patches.corners(self.scene, patch)))
         };
         patches.list.par_iter().map(is_unknown).collect()
     }
@@ -213,7 +209,6 @@ impl<'a> IndirectChange<'a> {
     fn keep(
         &self,
         light: PatchLight<'_>,
-        texels: &[Texel],
         local: &LocalLight,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
@@ -221,22 +216,22 @@ impl<'a> IndirectChange<'a> {
         if self.changes.nothing_changed {
             return Ok(choice::keep_all(self.changes));
         }
-        let change = self.of_texels(texels, light, options, monitor)?;
-        Ok(choice::choose(self.changes, texels, &change, local, options.error))
+        let change = self.of_texels(light, options, monitor)?;
+        Ok(choice::choose(self.changes, &self.texels.list, &change, local, options.error))
     }
 
     /// By how much the light by bounces may have changed at every covered texel, W/m², root mean square of the
     /// channels. It is estimated for blocks of texels, and infinite in and next to changed boxes.
     fn of_texels(
         &self,
-        texels: &[Texel],
         light: PatchLight<'_>,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<f32>, BakeError> {
         let of_blocks = in_chunks(self.blocks.members.len(), monitor, |block| {
+            let members = &self.blocks.members[block];
             let members: Vec<&Texel> =
-                self.blocks.members[block].iter().map(|member| &texels[member.place()]).collect();
+                members.iter().map(|member| &self.texels.list[member.place()]).collect();
             if members.is_empty() {
                 return 0.0f32;
             }
@@ -388,10 +383,10 @@ impl<'a> IndirectChange<'a> {
         &self,
         triangle: u32,
         side: Side,
-        (u, v): (f32, f32),
+        at: (f32, f32),
         light: PatchLight<'_>,
     ) -> Option<(Vec3, Range)> {
-        let Some(patch) = light.patches.at(triangle, side, (u, v)) else {
+        let Some(patch) = light.patches.at(triangle, side, at) else {
             return Some((Vec3::ZERO, [Vec3::ZERO; 2]));
         };
         let patch = patch.place();
@@ -402,15 +397,10 @@ impl<'a> IndirectChange<'a> {
         let bounced = light.change.get(patch).map_or([Vec3::ZERO; 2], |range| range.map(|c| reflectance * c));
         // Where no texel shows the surface, its former light is taken to be the patch's present light.
         let exitance = light.exitance[patch];
-        let scene_triangle = &self.scene.triangles[triangle as usize];
-        let map = &self.layout.maps[scene_triangle.object as usize];
-        let [a, b, c] = scene_triangle.uv;
-        let uv = a + (b - a) * u + (c - a) * v;
-        let (x, y) = (uv.x as u32, uv.y as u32);
-        if side == Side::Back || x >= map.width || y >= map.height {
+        let shown = self.texels.layout.texel_at(&self.scene.triangles[triangle as usize], at);
+        let Some(texel) = shown.filter(|_| side == Side::Front).map(MapTexel::place) else {
             return Some((exitance, bounced));
-        }
-        let texel = map.first + (y * map.width + x) as usize;
+        };
         let before = self.changes.former_light[texel];
         // A texel without former light was hidden: the object that hid it is gone, and the ray crosses its box.
         let before = if before.is_nan() { exitance } else { reflectance * before };

@@ -30,7 +30,6 @@ mod report;
 mod reuse;
 mod samples;
 mod samples_file;
-mod settled;
 
 pub(crate) use indirect_change::reused_gather;
 pub(crate) use report::rebake_report;

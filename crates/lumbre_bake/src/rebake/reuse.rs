@@ -1,21 +1,22 @@
 //! What a bake takes from a former one and leaves for the next. The stages of direct and gathered light get what
 //! may be reused as an input; all others know nothing of it. Not the choice of what is kept: that is `choice`.
 
-use super::changes::{Changes, ReusableBake};
-use super::samples::{SampleCollector, Samples};
+use super::changes::Changes;
+use super::fingerprints::{bounds, emission, layouts};
+use super::samples::{Content, ObjectSamples, Samples, TexelSamples};
 use crate::content_hash::{ContentHash, Hashes};
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::final_gather::lit_texels::LitTexels;
 use crate::final_gather::reused_gather::ReusedGather;
 use crate::scene::{Canonical, SceneObject, StaticScene, density_of};
 use crate::sources::light_sources::Sources;
-use crate::{BakeOptions, BakeReport};
+use crate::{BakeOptions, BakeReport, RebakeReport};
 use glam::Vec3;
 
 /// The former bake, if it can be used, and the identity of this one.
 pub(crate) struct Reuse<'a> {
     hashes: Hashes,
-    reusable: Option<ReusableBake<'a>>,
+    former: Option<&'a Content>,
     /// Hash of everything that the bits of this bake follow from, former bakes included.
     pub identity: ContentHash,
 }
@@ -31,37 +32,49 @@ impl<'a> Reuse<'a> {
         options: &BakeOptions,
         report: &mut BakeReport,
     ) -> Self {
-        let reusable = ReusableBake::of(former, &hashes, input, options, report);
-        let identity = reusable.as_ref().map_or(hashes.content, |former| former.identity(hashes.content));
+        let usable =
+            |former: &&Content| match former.check_use(&hashes, &input.objects, input.space(), options) {
+                Ok(()) => true,
+                Err(reason) => {
+                    report.rebake = Some(RebakeReport { whole: reason, ..RebakeReport::default() });
+                    false
+                }
+            };
+        let former = former.map(|samples| &samples.0).filter(usable);
+        let identity = match former {
+            None => hashes.content,
+            // If nothing has changed, everything is kept, with the same bits.
+            Some(former) if former.content == hashes.content => former.identity,
+            Some(former) => hashes.content.made_from(&former.identity),
+        };
         let identity = if limited { identity.made_from(&hashes.sampling) } else { identity };
-        Self { hashes, reusable, identity }
+        Self { hashes, former, identity }
     }
 
     /// Returns true if there is a former bake that can be used.
     pub fn is_possible(&self) -> bool {
-        self.reusable.is_some()
+        self.former.is_some()
     }
 
     /// The space that the bake works in: the former bake's, so that texels stay where they were.
     pub fn space(&self, input: &StaticScene) -> Canonical {
-        self.reusable.as_ref().map_or_else(|| input.space(), |former| former.space)
+        self.former.map_or_else(|| input.space(), |former| former.space)
     }
 
     /// Texels per canonical unit: those of the former bake, or what the options ask for.
     pub fn density(&self, input: &StaticScene, options: &BakeOptions) -> f64 {
-        let density = self.reusable.as_ref().map(|former| former.density);
-        density.unwrap_or_else(|| density_of(&input.objects, self.space(input), options))
+        self.former
+            .map_or_else(|| density_of(&input.objects, self.space(input), options), |former| former.density)
     }
 
-    /// Compares the scene with that of the former bake; `None` if there is none. The former bake is given up by that: its samples are then in the result.
+    /// Compares the scene with that of the former bake; `None` if there is none.
     pub fn changes(
-        &mut self,
+        &self,
         objects: &[SceneObject],
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
     ) -> Option<Changes<'a>> {
-        let former = self.reusable.take()?;
-        Some(Changes::find(&former, &self.hashes, objects, sources, texels))
+        Some(Changes::find(self.former?, &self.hashes, objects, sources, texels))
     }
 
     /// The samples of this bake, for the next one. `exitance` holds the least and most of each object, or is empty.
@@ -73,15 +86,28 @@ impl<'a> Reuse<'a> {
         sources: &Sources<'_>,
         exitance: &[[Vec3; 2]],
     ) -> Samples {
-        let collector = SampleCollector {
-            scene: sources.scene,
-            layout: lit.texels.layout,
-            texels: &lit.texels.list,
-            direct: &lit.direct.texels,
-            gathered: &lit.indirect.gathered,
-            bounced: &lit.indirect.light,
-            reuse_error: reused.map_or(&[], |reused| &reused.reuse_error),
+        let LitTexels { texels, .. } = lit;
+        let (bounds, emission, layouts) = (bounds(texels), emission(sources, texels), layouts(texels));
+        let of_object = |(index, texels): (usize, Vec<TexelSamples>)| ObjectSamples {
+            hash: self.hashes.objects[index],
+            name: objects[index].name.clone(),
+            low: bounds[index].0,
+            high: bounds[index].1,
+            emission: emission[index],
+            exitance: exitance.get(index).copied().unwrap_or_default(),
+            layout: layouts[index],
+            texels,
         };
-        collector.samples(self.identity, &self.hashes, objects, sources, exitance)
+        let by_object = TexelSamples::by_object(lit, reused.map_or(&[], |reused| &reused.reuse_error));
+        Samples(Content {
+            content: self.hashes.content,
+            identity: self.identity,
+            sampling: self.hashes.sampling,
+            lights: self.hashes.lights,
+            sky: sources.sky,
+            space: texels.scene.space,
+            density: texels.layout.density,
+            objects: by_object.into_iter().enumerate().map(of_object).collect(),
+        })
     }
 }

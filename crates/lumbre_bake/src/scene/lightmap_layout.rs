@@ -41,11 +41,16 @@ impl MapLayout {
         self.first..self.first + (self.width * self.height) as usize
     }
 
-    /// The texels at most `radius` columns and rows away from one, itself included, row by row.
-    pub fn neighbourhood(&self, x: u32, y: u32, radius: u32) -> impl Iterator<Item = MapTexel> {
+    /// The columns and rows at most `radius` away from those of a texel, its own included, row by row.
+    pub fn around(&self, x: u32, y: u32, radius: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
         let columns = x.saturating_sub(radius)..=(x + radius).min(self.width - 1);
         let rows = y.saturating_sub(radius)..=(y + radius).min(self.height - 1);
-        rows.flat_map(move |y| columns.clone().map(move |x| self.texel(x, y)))
+        rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
+    }
+
+    /// The texels at most `radius` columns and rows away from one, itself included, row by row.
+    pub fn neighbourhood(&self, x: u32, y: u32, radius: u32) -> impl Iterator<Item = MapTexel> {
+        self.around(x, y, radius).map(|(x, y)| self.texel(x, y))
     }
 }
 

@@ -19,22 +19,11 @@ mod samples;
 
 use glam::Vec3;
 
-use crate::coverage::footprint::Texel;
+use crate::coverage::covered_texels::CoveredTexels;
 use crate::monitor::BakeMonitor;
 use crate::report::SeamReport;
-use crate::scene::{BakeScene, LightmapLayout};
 use crate::{BakeError, BakeOptions, BakeReport};
 use least_squares::{Patience, Unknowns};
-
-/// The scene and the layout of its maps, for closing seams.
-pub(crate) struct Maps<'a> {
-    pub scene: &'a BakeScene,
-    pub layout: &'a LightmapLayout,
-    pub texels: &'a [Texel],
-    pub charts: &'a [u32],
-    /// Mean irradiance of the open texels, mean of the channels.
-    pub mean: f64,
-}
 
 /// The values of the maps, per texel of all maps.
 pub(crate) struct MapValues<'a> {
@@ -43,9 +32,6 @@ pub(crate) struct MapValues<'a> {
     /// Squared errors, mean of the channels; NaN where no surface is shown.
     pub variances: &'a mut [f32],
 }
-
-/// The chart of a texel that shows no surface in the open.
-const NO_CHART: u32 = u32::MAX;
 
 /// The outcome of closing seams.
 struct Closed {
@@ -57,9 +43,10 @@ struct Closed {
 }
 
 /// Closes the seams of the maps, unless that is switched off, and reports the outcome. How far a texel is moved is
-/// added to its error.
+/// added to its error. `mean` is the mean irradiance of the open texels, mean of the channels.
 pub(crate) fn close_seams(
-    maps: &Maps<'_>,
+    texels: &CoveredTexels<'_>,
+    mean: f64,
     shown: MapValues<'_>,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
@@ -70,7 +57,7 @@ pub(crate) fn close_seams(
         return Ok(());
     }
     let patience = if monitor.clock().is_over() { Patience::LATE } else { Patience::WHOLE };
-    let closed = monitor.run_interruptible(0.0, || close(maps, shown, patience))?;
+    let closed = monitor.run_interruptible(0.0, || close(texels, mean, shown, patience))?;
     report.rays += closed.rays;
     report.warnings.extend(closed.warning);
     match closed.report {
@@ -80,16 +67,12 @@ pub(crate) fn close_seams(
     Ok(())
 }
 
-fn close(maps: &Maps<'_>, shown: MapValues<'_>, patience: Patience) -> Closed {
-    if maps.mean.is_nan() || maps.mean <= 0.0 {
+fn close(texels: &CoveredTexels<'_>, mean: f64, shown: MapValues<'_>, patience: Patience) -> Closed {
+    if mean.is_nan() || mean <= 0.0 {
         return Closed { report: Err("the maps are black"), rays: 0, warning: None };
     }
-    let edges = edges::borders(maps.scene);
-    let mut charts = vec![NO_CHART; maps.layout.texels];
-    for texel in maps.texels.iter().filter(|texel| !texel.is_hidden()) {
-        charts[texel.index.place()] = maps.charts[texel.triangle as usize];
-    }
-    let seams = samples::Sampling { maps, charts: &charts, filled: shown.light, edges: &edges }.all();
+    let edges = edges::borders(texels.scene);
+    let seams = samples::Sampling { texels, filled: shown.light, edges: &edges }.all();
     let (rays, crowded) = (seams.rays, seams.crowded);
     let warning = (crowded > 0).then(|| {
         format!("so many borders of charts lie in one place that {crowded} of them were not compared with all others; seams may show there")
@@ -97,8 +80,8 @@ fn close(maps: &Maps<'_>, shown: MapValues<'_>, patience: Patience) -> Closed {
     if seams.samples.is_empty() {
         return Closed { report: Err("no two borders of charts join smoothly in one place"), rays, warning };
     }
-    let unknowns = Unknowns::new(maps, &charts, &shown, &seams.samples);
-    let mut report = unknowns.solve(&seams.samples, shown, maps.mean, patience, &maps.scene.stop);
+    let unknowns = Unknowns::new(texels, &shown, &seams.samples);
+    let mut report = unknowns.solve(&seams.samples, shown, mean, patience, &texels.scene.stop);
     report.edges = seams.pairs;
     Closed { report: Ok(report), rays, warning }
 }
