@@ -17,6 +17,7 @@ use lumbre_optics::{AlphaMode, Light, Material, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 use serde::{Deserialize, Serialize};
 
+use crate::bounds::Bounds;
 use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, from_world};
 use crate::{BakeError, BakeOptions};
 
@@ -123,19 +124,13 @@ pub(crate) fn hashes_of(input: &StaticScene, options: &BakeOptions) -> Hashes {
     hasher.number(probes.into());
     if probes {
         // The box around moving objects determines the grid of probes.
-        let (low, high) = bounds(input.moving_points());
+        let finite = input.moving_points().iter().copied().filter(|point| point.is_finite());
+        let Bounds::<DVec3> { low, high } = finite.collect();
         hasher.doubles(&[low.to_array(), high.to_array()].concat());
         hasher.number(input.primitives().count() as u64);
         input.primitives().for_each(|primitive| hasher.number(primitive.lights_frames.into()));
     }
     Hashes { content: hasher.finish(), objects: object_hashes, lights: all_lights, sampling }
-}
-
-/// Lowest and highest corner of the points' bounding box; +∞ and -∞ if there are no points.
-fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
-    let finite = points.iter().filter(|point| point.is_finite());
-    finite
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point)))
 }
 
 /// The hash of an object, including its transform.

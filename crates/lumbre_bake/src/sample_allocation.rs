@@ -17,6 +17,12 @@ pub(crate) struct SampleAllocation {
     pub samples: u32,
 }
 
+/// How many samples the allocations add to those that the covered texels have.
+pub(crate) fn added(allocations: &[SampleAllocation], samples: &[u32]) -> u64 {
+    let added = |to: &SampleAllocation| u64::from(to.samples - samples[to.texel.place()]);
+    allocations.iter().map(added).sum()
+}
+
 /// Texels that are summed up in one task.
 const CHUNK: usize = 4096;
 /// The most times that one round doubles a texel's samples: a variance from few samples cannot be trusted further.
@@ -108,9 +114,7 @@ pub(crate) fn allocate_within(
     let left: f64 = texels.clone().map(|texel| f64::from(variances[texel.place()])).sum();
     loop {
         let wanted = allocate(texels.clone(), variances, samples, most, order, goal);
-        let more =
-            |allocation: &SampleAllocation| u64::from(allocation.samples - samples[allocation.texel.place()]);
-        if wanted.iter().map(more).sum::<u64>() <= budget {
+        if added(&wanted, samples) <= budget {
             return wanted;
         }
         if goal >= left {

@@ -3,6 +3,7 @@
 
 pub(crate) mod box_sums;
 pub(crate) mod conserve_light;
+pub(crate) mod denoised;
 pub(crate) mod filter_features;
 pub(crate) mod filter_pass;
 pub(crate) mod kernel;

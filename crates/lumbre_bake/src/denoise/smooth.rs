@@ -33,15 +33,15 @@ const FIRST: FilterPass = FilterPass { width: 2.5, near: 1.0, guide_steps: 1, bi
 const SECOND: FilterPass = FilterPass { width: 9.0, near: 12.0, guide_steps: 0, bias_noise: 0.33 };
 
 /// The smoothed estimates of every covered texel, and the squared bias that smoothing may have brought, mean of the
-/// channels. `nearness` holds, per texel, the mean of that of the surfaces or lights that its samples reached.
+/// channels. `nearness` is, per texel, the mean of that of the surfaces or lights that its samples reached.
 pub(crate) fn smooth(
     neighbourhoods: &Neighbourhoods<'_>,
     estimates: &[Estimates],
-    nearness: &[Nearness],
+    nearness: impl Fn(usize) -> Nearness + Sync,
 ) -> (Vec<Estimates>, Vec<f32>) {
     let grid = neighbourhoods.grid();
     let nearness: ChannelRows<NEARNESS> =
-        neighbourhoods.fill(|index| nearness_channels(nearness[index], &neighbourhoods.map_axes(index)));
+        neighbourhoods.fill(|index| nearness_channels(nearness(index), &neighbourhoods.map_axes(index)));
     let mut smoothed: Smoothed = neighbourhoods.fill(|index| {
         let estimates = &estimates[index];
         std::array::from_fn(|place| if place < BIAS { estimates[place / 3][place % 3] } else { 0.0 })

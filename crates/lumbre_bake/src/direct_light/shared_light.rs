@@ -12,17 +12,16 @@ use super::local_light::LocalLight;
 use crate::chunks::{decide, in_chunks, in_chunks_until_deadline};
 use crate::coverage::footprint::{Texel, receiver};
 use crate::coverage::tile_sequence::TileSequence;
+use crate::denoise::denoised::Denoised;
 use crate::denoise::nearness::Nearness;
 use crate::denoise::neighbourhoods::Neighbourhoods;
-use crate::denoise::replicates::{Estimates, REPLICATES, mean, spread};
-use crate::denoise::smooth::smooth;
+use crate::denoise::replicates::{Estimates, REPLICATES, mean};
 use crate::monitor::BakeMonitor;
-use crate::sample_allocation::{SampleAllocation, allocate_within};
+use crate::sample_allocation::{SampleAllocation, added, allocate_within};
 use crate::sampling::{Stream, hash};
 use crate::sources::direct::Direct;
 use crate::sources::light_cut::SharedSources;
 use crate::sources::light_sources::Sources;
-use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions};
 
@@ -106,15 +105,7 @@ pub(crate) struct SharedLight<'a> {
     /// Per covered texel.
     sums: Vec<SampleSums>,
     /// The smoothed light of `sums`; updated after every round.
-    smoothed: SmoothedLight,
-}
-
-/// Light whose noise has been smoothed over neighbours, and its errors.
-#[derive(Default)]
-struct SmoothedLight {
-    /// Per covered texel.
-    estimates: Vec<Estimates>,
-    variances: SquaredErrors,
+    smoothed: Denoised,
 }
 
 impl<'a> SharedLight<'a> {
@@ -129,7 +120,7 @@ impl<'a> SharedLight<'a> {
     ) -> Result<Self, BakeError> {
         let texels = &neighbourhoods.texels.list;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
-        let (sums, smoothed) = (Vec::new(), SmoothedLight::default());
+        let (sums, smoothed) = (Vec::new(), Denoised::default());
         let mut light = Self { sources, texels, cuts, neighbourhoods, options, first, most, sums, smoothed };
         // A complete map comes first, whatever time it takes; if time is limited, with a single sample.
         let begun = monitor.seconds();
@@ -183,17 +174,10 @@ impl<'a> SharedLight<'a> {
     }
 
     /// Smooths the samples, and estimates the errors of the result.
-    fn smooth(&self, monitor: &mut BakeMonitor<'_>) -> Result<SmoothedLight, BakeError> {
+    fn smooth(&self, monitor: &mut BakeMonitor<'_>) -> Result<Denoised, BakeError> {
         let raw: Vec<Estimates> = self.sums.par_iter().map(SampleSums::estimates).collect();
-        let (estimates, bias) = monitor.run_interruptible(1.0, || match self.options.denoise {
-            true => {
-                let nearness: Vec<Nearness> = self.sums.par_iter().map(SampleSums::mean_nearness).collect();
-                smooth(&self.neighbourhoods, &raw, &nearness)
-            }
-            false => (raw, vec![0.0; self.sums.len()]),
-        })?;
-        let spread = monitor.run_interruptible(1.0, || spread(&self.neighbourhoods, &estimates))?;
-        Ok(SmoothedLight { variances: spread.with(&bias), estimates })
+        let nearness = |place: usize| self.sums[place].mean_nearness();
+        Denoised::new(&self.neighbourhoods, &raw, nearness, self.options.denoise, monitor)
     }
 
     /// Takes more rounds. `goal` maps a share of the requested squared error to the sum over all texels of squared
@@ -208,7 +192,7 @@ impl<'a> SharedLight<'a> {
     ) -> Result<(), BakeError> {
         let (mut before, mut chosen_share) = (f64::INFINITY, None);
         loop {
-            let relative = local.relative_errors(&self.smoothed.variances);
+            let relative = local.relative_errors(&self.smoothed.errors());
             let is_sampled = |texel: &CoveredTexel| self.sums[texel.place()].samples > 0;
             let sampled = CoveredTexel::all(self.texels.len()).filter(is_sampled);
             let summed =
@@ -229,10 +213,7 @@ impl<'a> SharedLight<'a> {
             // Before a round can reach the least share, a few uncertain texels dominate and the samples of the others
             // cannot be foreseen.
             if chosen_share.is_none() && left <= MAX_REDUCTION * goal(least) {
-                let more = |allocation: &SampleAllocation| {
-                    u64::from(allocation.samples - samples[allocation.texel.place()])
-                };
-                let foreseen = taken + allocate(goal(least)).iter().map(more).sum::<u64>();
+                let foreseen = taken + added(&allocate(goal(least)), &samples);
                 chosen_share = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
             }
             let goal = goal(chosen_share.unwrap_or(least));
@@ -260,7 +241,7 @@ impl<'a> SharedLight<'a> {
 
     /// Adds the smoothed light to that of the individually sampled sources.
     pub fn add_to(self, direct: &mut [Direct]) {
-        let SmoothedLight { estimates, variances } = self.smoothed;
+        let (variances, Denoised { estimates, .. }) = (self.smoothed.errors(), self.smoothed);
         for (place, (direct, sums)) in direct.iter_mut().zip(&self.sums).enumerate() {
             if sums.samples > 0 {
                 let (estimates, variance) = (&estimates[place], variances.cautious[place]);

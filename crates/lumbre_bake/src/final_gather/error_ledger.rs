@@ -60,7 +60,8 @@ use rayon::prelude::*;
 use super::error_estimate::PatchBias;
 use crate::ErrorPart;
 use crate::coverage::footprint::Texel;
-use crate::denoise::replicates::{Estimates, mean};
+use crate::denoise::denoised::Denoised;
+use crate::denoise::replicates::mean;
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
 use crate::final_gather::gather_sums::GatherSums;
@@ -69,10 +70,7 @@ use crate::sources::direct::Direct;
 /// The gather's results and errors, per covered texel.
 pub(crate) struct GatherErrors<'a> {
     pub gathered: &'a [GatherSums],
-    pub estimates: &'a [Estimates],
-    /// Variance of the mean of each texel's replicates.
-    pub noise: &'a SquaredErrors,
-    pub smoothing: &'a [f32],
+    pub denoised: &'a Denoised,
     pub patches: &'a [PatchBias],
     /// Bound of the solver's error, relative to the light by bounces.
     pub residual_bound: f64,
@@ -108,31 +106,18 @@ enum Term {
 const ARITHMETIC: f32 = 16.0 / (1 << 24) as f32;
 
 impl Term {
-    const ALL: [Self; 9] = [
-        Self::DirectLight,
-        Self::Noise,
-        Self::Smoothing,
-        Self::FormFactors,
-        Self::TexelsRead,
-        Self::Patches,
-        Self::Solver,
-        Self::ReusedGather,
-        Self::Arithmetic,
+    /// All terms, with their names in reports.
+    const ALL: [(Self, &'static str); 9] = [
+        (Self::DirectLight, "noise of direct light"),
+        (Self::Noise, "noise of the final gather"),
+        (Self::Smoothing, "smoothing"),
+        (Self::FormFactors, "form factors and patches' size"),
+        (Self::TexelsRead, "noise of texels that rays read"),
+        (Self::Patches, "patches beside real bounces"),
+        (Self::Solver, "solver"),
+        (Self::ReusedGather, "light kept of a former bake"),
+        (Self::Arithmetic, "arithmetic"),
     ];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::DirectLight => "noise of direct light",
-            Self::Noise => "noise of the final gather",
-            Self::Smoothing => "smoothing",
-            Self::FormFactors => "form factors and patches' size",
-            Self::TexelsRead => "noise of texels that rays read",
-            Self::Patches => "patches beside real bounces",
-            Self::Solver => "solver",
-            Self::ReusedGather => "light kept of a former bake",
-            Self::Arithmetic => "arithmetic",
-        }
-    }
 }
 
 impl<'a> ErrorLedger<'a> {
@@ -159,11 +144,6 @@ impl ErrorLedger<'_> {
         SquaredErrors { cautious, expected }
     }
 
-    /// The part of each texel's error that more rays reduce.
-    pub fn by_rays(&self) -> SquaredErrors {
-        self.gather.as_ref().map_or_else(SquaredErrors::default, |gather| gather.noise.with(gather.smoothing))
-    }
-
     /// By how much the sum over texels of the expected total, relative to the light around them, exceeds what is
     /// expected of the whole map: the patches' error of a single texel contains the effect of chance, which cancels in
     /// the mean of many.
@@ -180,11 +160,11 @@ impl ErrorLedger<'_> {
     pub fn parts(&self, texels: &[Texel], local: &LocalLight) -> Vec<ErrorPart> {
         let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
         let by_chance = self.by_chance(texels, local);
-        let part = |term: Term| {
+        let part = |(term, name): (Term, &str)| {
             let squares: Vec<f32> = (0..texels.len()).map(|index| self.expected(term, index)).collect();
             let sum = open_sum(texels, &local.relative(&squares));
             let sum = if term == Term::Patches { sum - by_chance } else { sum };
-            ErrorPart { what: term.name().to_owned(), error: (sum / open).max(0.0).sqrt() }
+            ErrorPart { what: name.to_owned(), error: (sum / open).max(0.0).sqrt() }
         };
         let mut parts: Vec<ErrorPart> =
             Term::ALL.into_iter().map(part).filter(|part| part.error > 0.0).collect();
@@ -198,14 +178,14 @@ impl ErrorLedger<'_> {
             (Term::DirectLight, _) => self.direct[index].variance,
             (Term::Arithmetic, _) => (ARITHMETIC * self.light).powi(2),
             (_, None) => 0.0,
-            (Term::Noise, Some(gather)) => gather.noise.cautious[index],
-            (Term::Smoothing, Some(gather)) => gather.smoothing[index],
+            (Term::Noise, Some(gather)) => gather.denoised.noise.cautious[index],
+            (Term::Smoothing, Some(gather)) => gather.denoised.smoothing[index],
             (Term::FormFactors, Some(gather)) => gather.gathered[index].patch_error().length_squared(),
             (Term::TexelsRead, Some(gather)) => gather.gathered[index].texel_variance(),
             (Term::Patches, Some(gather)) => gather.patches[index].rest,
             (Term::Solver, Some(gather)) => {
                 let unsolved =
-                    gather.residual_bound as f32 * mean(&gather.estimates[index]).element_sum() / 3.0;
+                    gather.residual_bound as f32 * mean(&gather.denoised.estimates[index]).element_sum() / 3.0;
                 unsolved * unsolved
             }
             (Term::ReusedGather, Some(gather)) => {
@@ -218,7 +198,7 @@ impl ErrorLedger<'_> {
     fn expected(&self, term: Term, index: usize) -> f32 {
         match (term, &self.gather) {
             (Term::DirectLight, _) => self.direct[index].variance - self.direct[index].caution,
-            (Term::Noise, Some(gather)) => gather.noise.expected[index],
+            (Term::Noise, Some(gather)) => gather.denoised.noise.expected[index],
             _ => self.stated(term, index),
         }
     }

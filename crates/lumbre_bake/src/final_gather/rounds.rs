@@ -17,14 +17,13 @@ use crate::chunks::decide;
 use crate::color::wide_channel_mean;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::Texel;
-use crate::denoise::nearness::Nearness;
+use crate::denoise::denoised::Denoised;
 use crate::denoise::neighbourhoods::Neighbourhoods;
-use crate::denoise::replicates::{Estimates, REPLICATES, mean, spread};
-use crate::denoise::smooth::smooth;
+use crate::denoise::replicates::{Estimates, REPLICATES, mean};
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
 use crate::monitor::{BakeMonitor, Clock};
-use crate::sample_allocation::{SampleAllocation, allocate_within};
+use crate::sample_allocation::{SampleAllocation, added, allocate_within};
 use crate::sources::direct::Direct;
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
@@ -132,7 +131,7 @@ pub(crate) fn gather(
         })?;
         monitor.pass(ROUND_PROGRESS);
         let rest = planner.open.iter().map(|texel| reads.rest_in(&gathered[texel.place()])).sum::<f64>();
-        reads.add(next.samples(&gathered), rest / planner.count());
+        reads.add((next.added * REPLICATES as u64) as f64, rest / planner.count());
         let (begun, samples) = (monitor.seconds(), all_samples(&gathered));
         in_time = cache.cast(list, &next.wanted, &mut gathered, options.seed, monitor)?;
         speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
@@ -208,6 +207,8 @@ struct RoundResult {
 /// What the next round should cast.
 struct RoundPlan {
     wanted: Vec<SampleAllocation>,
+    /// Samples of each replicate that it adds, of all texels together.
+    added: u64,
     /// The part of [`RoundResult::relative_squares`] that rays reduce.
     reducible_error: f64,
     /// The quality's rays are spent, or no texel would get more: there is no next round.
@@ -219,14 +220,6 @@ struct RoundPlan {
 }
 
 impl RoundPlan {
-    /// How many samples, of all replicates together, are to be added to what has been `gathered`.
-    fn samples(&self, gathered: &[GatherSums]) -> f64 {
-        let added = |allocation: &SampleAllocation| {
-            f64::from(allocation.samples) - f64::from(gathered[allocation.texel.place()].samples)
-        };
-        self.wanted.iter().map(added).sum::<f64>() * REPLICATES as f64
-    }
-
     /// Returns true if the round that followed this plan hardly reduced the error: `left` is its reducible error
     /// afterwards.
     fn has_stalled(&self, left: f64) -> bool {
@@ -281,23 +274,15 @@ impl<'a> RoundPlanner<'a> {
     ) -> Result<RoundResult, BakeError> {
         let (neighbourhoods, texels, local) = (self.neighbourhoods, self.texels, self.local);
         let raw: Vec<Estimates> = gathered.par_iter().map(GatherSums::estimates).collect();
-        let (estimates, smoothing) = monitor.run_interruptible(1.0, || match self.options.denoise {
-            true => {
-                let nearness: Vec<Nearness> = gathered.par_iter().map(GatherSums::mean_nearness).collect();
-                smooth(neighbourhoods, &raw, &nearness)
-            }
-            false => (raw.clone(), vec![0.0; texels.len()]),
-        })?;
+        let nearness = |place: usize| gathered[place].mean_nearness();
+        let denoised = Denoised::new(neighbourhoods, &raw, nearness, self.options.denoise, monitor)?;
         let patches =
             monitor.run_interruptible(1.0, || patch_bias(neighbourhoods, texels, gathered, &raw, reads))?;
-        let noise = monitor.run_interruptible(1.0, || spread(neighbourhoods, &estimates))?;
-        let bounced = estimates.iter().map(|e| wide_channel_mean(mean(e))).sum::<f64>();
+        let bounced = denoised.estimates.iter().map(|e| wide_channel_mean(mean(e))).sum::<f64>();
         let total = self.mean_direct + bounced / self.count();
         let gather = GatherErrors {
             gathered,
-            estimates: &estimates,
-            noise: &noise,
-            smoothing: &smoothing,
+            denoised: &denoised,
             patches: &patches,
             residual_bound: report.residual_bound,
             kept: self.reuse_error,
@@ -310,8 +295,8 @@ impl<'a> RoundPlanner<'a> {
         report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
         monitor.note_error(report.estimated_error);
         monitor.advance(1.0)?;
-        let light = without_patch_bias(&estimates, &patches);
-        let (reducible, relative_squares) = (ledger.by_rays(), map_error.relative_squares);
+        let light = without_patch_bias(&denoised.estimates, &patches);
+        let (reducible, relative_squares) = (denoised.errors(), map_error.relative_squares);
         Ok(RoundResult { light, variances, reducible, relative_squares })
     }
 
@@ -354,10 +339,7 @@ impl<'a> RoundPlanner<'a> {
             allocate_within(budget, open.clone(), errors, &samples, max_samples, CONVERGENCE_ORDER, goal)
         };
         let mut wanted = within(budget);
-        let more = |allocation: &SampleAllocation| {
-            u64::from(allocation.samples) - u64::from(samples[allocation.texel.place()])
-        };
-        let is_short_of_time = wanted.iter().map(more).sum::<u64>() > affordable;
+        let is_short_of_time = added(&wanted, &samples) > affordable;
         let is_late = is_short_of_time && (affordable as f64) < MIN_ROUND * cast as f64;
         if is_late {
             wanted = Vec::new();
@@ -369,6 +351,7 @@ impl<'a> RoundPlanner<'a> {
             is_last: (is_spent && !is_small_step) || (wanted.is_empty() && !is_late),
             is_small_step,
             is_late,
+            added: added(&wanted, &samples),
             wanted,
         }
     }

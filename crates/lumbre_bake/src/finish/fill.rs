@@ -6,6 +6,7 @@
 use glam::{DMat2, DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
+use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
 use crate::coverage::contact_lines::ContactLines;
 use crate::coverage::covered_texels::CoveredTexels;
@@ -125,7 +126,7 @@ fn extrapolate(
     let mut moments = [0.0f64; 6];
     let mut sums = [glam::DVec3::ZERO; 3];
     // Ranges of the values of the nine nearest texels, and of those one texel further out.
-    let mut ranges = [(Vec3::INFINITY, Vec3::NEG_INFINITY); 2];
+    let mut ranges = [Bounds::<Vec3>::default(); 2];
     // Distance, value and squared error.
     let mut nearest = (f32::INFINITY, Vec3::ZERO, 0.0);
     // Weights, offsets from the centre, and squared errors.
@@ -154,8 +155,7 @@ fn extrapolate(
         for (sum, term) in sums.iter_mut().zip([1.0, dx, dy]) {
             *sum += value * (weight * term);
         }
-        let range = &mut ranges[usize::from(x.abs_diff(nx).max(y.abs_diff(ny)) > 1)];
-        *range = (range.0.min(other.value), range.1.max(other.value));
+        ranges[usize::from(x.abs_diff(nx).max(y.abs_diff(ny)) > 1)].extend([other.value]);
         if d.length() < nearest.0 {
             nearest = (d.length(), other.value, other.variance);
         }
@@ -175,7 +175,7 @@ fn extrapolate(
     let value = (mean + (with_x - mean * sx) * to_centre.x + (with_y - mean * sy) * to_centre.y).as_vec3();
     // The nearest texels alone give the range, if there are any: a shadow's edge two texels away must not reach this
     // one.
-    let (low, high) = if ranges[0].0.x <= ranges[0].1.x { ranges[0] } else { ranges[1] };
+    let Bounds { low, high } = if ranges[0].low.x <= ranges[0].high.x { ranges[0] } else { ranges[1] };
     let margin = (high - low) * 0.5;
     let value = value.clamp((low - margin).max(Vec3::ZERO), high + margin);
     let (mut independent, mut correlated) = (0.0, 0.0);

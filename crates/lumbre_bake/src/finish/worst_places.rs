@@ -3,9 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec3, IVec3, Vec3};
+use glam::{DVec3, IVec3};
 
 use crate::WorstPlace;
+use crate::bounds::Bounds;
 use crate::coverage::footprint::{Texel, receiver};
 use crate::scene::{BakeScene, SceneObject};
 
@@ -35,8 +36,7 @@ pub(crate) fn worst_places(
     squares: &[f32],
     whole: f64,
 ) -> Vec<WorstPlace> {
-    let corners = || scene.triangles.iter().flat_map(|triangle| triangle.corners);
-    let (low, high) = corners().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
+    let Bounds { low, high } = scene.triangles.iter().flat_map(|triangle| triangle.corners).collect();
     let side = CUBE_SIDE * (high - low).max_element();
     let mut places: BTreeMap<[i32; 3], Place> = BTreeMap::new();
     let mut open = 0u32;

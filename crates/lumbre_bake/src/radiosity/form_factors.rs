@@ -108,6 +108,14 @@ impl FormFactors {
         factors
     }
 
+    /// Appends a row: pairs of a patch, ascending, and the exchange area.
+    pub fn push_row(&mut self, row: Vec<(PatchIndex, f32)>) {
+        let (columns, exchange): (Vec<PatchIndex>, Vec<f32>) = row.into_iter().unzip();
+        self.columns.extend(columns);
+        self.exchange.extend(exchange);
+        self.starts.push(self.columns.len());
+    }
+
     /// The entries of row i: (j, G_ij).
     pub fn row(&self, i: PatchIndex) -> impl Iterator<Item = (PatchIndex, f64)> + '_ {
         let range = self.row_range(i);
@@ -204,11 +212,7 @@ fn pool(counts: &[Counts], areas: Vec<f32>, stop: &CancelToken) -> FormFactors {
     for first in (0..counts.len()).step_by(ROW_BATCH) {
         let places = first..(first + ROW_BATCH).min(counts.len());
         let rows: Vec<_> = places.into_par_iter().map(|i| row(PatchIndex::new(i))).collect();
-        for row in rows {
-            factors.columns.extend(row.iter().map(|entry| entry.0));
-            factors.exchange.extend(row.iter().map(|entry| entry.1));
-            factors.starts.push(factors.columns.len());
-        }
+        rows.into_iter().for_each(|row| factors.push_row(row));
     }
     factors
 }

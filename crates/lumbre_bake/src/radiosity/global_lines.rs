@@ -14,6 +14,7 @@ use super::cosine_rays::{self, MIN_RAYS};
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::BakeError;
+use crate::bounds::Bounds;
 use crate::chunks::{in_chunks, in_chunks_until_deadline};
 use crate::monitor::BakeMonitor;
 use crate::radiosity::ray_counts::{PatchRayCounts, counted};
@@ -87,9 +88,7 @@ struct Lines {
 impl Lines {
     fn new(scene: &BakeScene, seed: u32) -> Self {
         let corners = || scene.triangles.iter().filter(|t| !t.is_hidden_duplicate).flat_map(|t| t.corners);
-        let (low, high) = corners().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), corner| {
-            (low.min(corner), high.max(corner))
-        });
+        let Bounds { low, high } = corners().collect();
         let center = 0.5 * (low + high);
         let radius = corners().map(|corner| (corner - center).length()).fold(0.0, f32::max);
         let halves = [0, 1].map(|half| Sequence::new(seed, Stream::GlobalLines(half), 0));

@@ -134,16 +134,13 @@ impl<'a> Changes<'a> {
             emission.iter().zip(&unchanged).any(differs) || gone.iter().any(|gone| gone.emission != 0);
         let lights_or_sky_changed = former.lights != hashes.lights;
         let bounds = bounds(texels);
-        let after = (0..objects.len()).filter(|&object| changed[object]).map(|object| {
-            let (low, high) = bounds[object];
-            ChangedBox { low, high, former_exitance: None }
-        });
+        let after = bounds.into_iter().zip(&changed).filter(|(_, changed)| **changed);
+        let after = after.map(|(bounds, _)| ChangedBox { bounds, former_exitance: None });
         let before = gone.iter().map(|object| ChangedBox {
-            low: object.low,
-            high: object.high,
+            bounds: object.bounds,
             former_exitance: Some(object.exitance),
         });
-        let boxes: Vec<ChangedBox> = after.chain(before).filter(|b| b.low.cmple(b.high).all()).collect();
+        let boxes: Vec<ChangedBox> = after.chain(before).filter(|b| !b.bounds.is_empty()).collect();
         let names = names(objects, &changed, &gone, lights_or_sky_changed);
         let (known, former_light) = known(texels, &unchanged);
         let nothing_changed = former.content == hashes.content;

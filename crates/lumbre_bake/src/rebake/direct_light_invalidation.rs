@@ -9,6 +9,7 @@ use lumbre_optics::LightKind;
 use rayon::prelude::*;
 
 use super::changed_box::ChangedBox;
+use crate::bounds::Bounds;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::receiver;
 use crate::coverage::texel_geometry::positions_of;
@@ -27,9 +28,7 @@ struct Sphere {
 impl Sphere {
     /// A sphere that contains all points.
     fn around(points: impl Iterator<Item = Vec3> + Clone) -> Self {
-        let (low, high) = points.clone().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| {
-            (low.min(point), high.max(point))
-        });
+        let Bounds { low, high } = points.clone().collect();
         let center = 0.5 * (low + high);
         Self { center, radius: points.map(|point| point.distance(center)).fold(0.0, f32::max) }
     }

@@ -3,19 +3,17 @@
 
 use glam::Vec3;
 
+use crate::bounds::Bounds;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Footprint, Texel};
 use crate::sampling::hash;
 use crate::sources::light_sources::Sources;
 
 /// The bounding box of each object, canonical units; empty for an object without triangles.
-pub(crate) fn bounds(texels: &CoveredTexels<'_>) -> Vec<(Vec3, Vec3)> {
-    let mut bounds = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); texels.layout.maps.len()];
+pub(crate) fn bounds(texels: &CoveredTexels<'_>) -> Vec<Bounds<Vec3>> {
+    let mut bounds = vec![Bounds::default(); texels.layout.maps.len()];
     for triangle in &texels.scene.triangles {
-        let (low, high) = &mut bounds[triangle.object as usize];
-        for corner in triangle.corners {
-            (*low, *high) = (low.min(corner), high.max(corner));
-        }
+        bounds[triangle.object as usize].extend(triangle.corners);
     }
     bounds
 }

@@ -15,6 +15,7 @@ use super::changed_box::ChangedBox;
 use super::changes::Changes;
 use super::choice;
 use super::estimate::{Estimate, Range, cone_to_sphere, direction_in_cone};
+use crate::bounds::Bounds;
 use crate::chunks::in_chunks;
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::{Texel, receiver};
@@ -255,7 +256,7 @@ impl<'a> IndirectChange<'a> {
         self.changes
             .boxes
             .iter()
-            .any(|b| position.clamp(b.low, b.high).distance(position) <= NEAR_BOX * b.radius())
+            .any(|b| position.clamp(b.bounds.low, b.bounds.high).distance(position) <= NEAR_BOX * b.radius())
     }
 
     /// Samples the change of a receiver's irradiance by bounces: half the rays are cosine-distributed, half are aimed
@@ -363,11 +364,12 @@ impl<'a> IndirectChange<'a> {
         distance: f32,
     ) -> impl Iterator<Item = Range> {
         let crosses = move |b: &ChangedBox| {
+            let Bounds { low, high } = b.bounds;
             let (mut from, mut to) = (0.0f32, distance);
             for axis in 0..3 {
                 let inverse = 1.0 / direction[axis];
                 let (a, b) =
-                    ((b.low[axis] - origin[axis]) * inverse, (b.high[axis] - origin[axis]) * inverse);
+                    ((low[axis] - origin[axis]) * inverse, (high[axis] - origin[axis]) * inverse);
                 // Both are NaN for a ray in the plane of a flat box, and `min` and `max` ignore them. (Only one is NaN
                 // for a ray in the plane of a side of another box: the ray then counts as outside.)
                 from = from.max(a.min(b));

@@ -91,8 +91,7 @@ impl<'a> Reuse<'a> {
         let of_object = |(index, texels): (usize, Vec<TexelSamples>)| ObjectSamples {
             hash: self.hashes.objects[index],
             name: objects[index].name.clone(),
-            low: bounds[index].0,
-            high: bounds[index].1,
+            bounds: bounds[index],
             emission: emission[index],
             exitance: exitance.get(index).copied().unwrap_or_default(),
             layout: layouts[index],

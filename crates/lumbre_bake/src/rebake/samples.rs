@@ -5,6 +5,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::fingerprints::{fingerprint, first_triangles};
+use crate::bounds::Bounds;
 use crate::color::channel_mean;
 use crate::content_hash::ContentHash;
 use crate::final_gather::gather_sums::{GatherSums, UnguidedLight, Weights};
@@ -40,8 +41,7 @@ pub(crate) struct ObjectSamples {
     pub hash: ContentHash,
     pub name: String,
     /// Bounding box, canonical units.
-    pub low: Vec3,
-    pub high: Vec3,
+    pub bounds: Bounds<Vec3>,
     /// Hash of its emitters; 0 if it has none.
     pub emission: u32,
     /// Light that leaves it, without its emission, W/m²: the least and the most of its patches, by channel.

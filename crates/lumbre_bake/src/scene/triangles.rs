@@ -15,6 +15,7 @@ use super::rooms::{Room, all_within, pieces};
 use super::texture_coordinates::textures_of;
 use super::{LightmapLayout, PlacedPrimitive, SceneObject, SurfaceMaterial, world_points};
 use crate::BakeError;
+use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
 
 /// The canonical space that the baker computes in.
@@ -29,13 +30,11 @@ pub(crate) struct Canonical {
 impl Canonical {
     /// The canonical space of a scene with these points; points that are not finite are ignored.
     pub fn of(points: impl Iterator<Item = DVec3>) -> Self {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for point in points.filter(|point| point.is_finite()) {
-            (low, high) = (low.min(point), high.max(point));
-        }
-        if !low.cmple(high).all() {
+        let bounds: Bounds<DVec3> = points.filter(|point| point.is_finite()).collect();
+        if bounds.is_empty() {
             return Self { center: DVec3::ZERO, scale: 1.0 };
         }
+        let Bounds { low, high } = bounds;
         let center = 0.5 * low + 0.5 * high;
         let reach = (high - center).max_element();
         // Rounding in log2 can put the exponent off by one at worst, which is good enough.
@@ -323,7 +322,7 @@ fn normal_and_area(corners: &[Vec3; 3]) -> Option<(Vec3, f32)> {
 }
 
 /// A closed piece whose fronts face outward: its number and bounding box.
-type Solid = (u32, Vec3, Vec3);
+type Solid = (u32, Bounds<Vec3>);
 
 /// Marks the triangles of closed pieces in the object whose triangles begin at `first`, and appends its rooms and
 /// solids.
@@ -349,7 +348,7 @@ fn mark_closed(
     for piece in pieces {
         match piece.room {
             Some(room) => rooms.push(room),
-            None => solids.push((number(piece.number), piece.low, piece.high)),
+            None => solids.push((number(piece.number), piece.bounds)),
         }
     }
 }
@@ -373,7 +372,7 @@ fn unmark_hollow_solids(
         ));
     }
     let is_hollow =
-        |(_, low, high): &&Solid| too_many || rooms.iter().any(|room| room.is_within(*low, *high));
+        |(_, bounds): &&Solid| too_many || rooms.iter().any(|room| room.is_within(*bounds));
     // In ascending order, as objects and their pieces are, which the binary search needs.
     let hollow: Vec<u32> = solids.iter().filter(is_hollow).map(|(number, ..)| *number).collect();
     for triangle in triangles {

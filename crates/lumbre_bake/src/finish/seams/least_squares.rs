@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use super::MapValues;
 use super::samples::{Reading, Sample};
+use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
 use crate::conjugate_gradients::{self, System};
 use crate::coverage::covered_texels::CoveredTexels;
@@ -181,14 +182,14 @@ fn variance(texels: &CoveredTexels<'_>, shown: &MapValues<'_>, texel: MapTexel) 
     let local = texel.0 - map.first as u32;
     let (x, y) = (local % map.width, local / map.width);
     let chart = texels.chart_at(texel);
-    let (mut low, mut high, mut stated) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
+    let (mut values, mut stated) = (Bounds::<Vec3>::default(), 0.0f32);
     for other in map.neighbourhood(x, y, 1) {
         // A texel beside a chart has the range and the error of whatever charts lie around it.
         let other_chart = texels.chart_at(other);
         let is_same_chart = other_chart.is_some() && (chart.is_none() || other_chart == chart);
         let other = other.place();
         if is_same_chart && filled[other].is_finite() {
-            (low, high) = (low.min(filled[other]), high.max(filled[other]));
+            values.extend([filled[other]]);
             // The error of a texel that shows no surface is NaN, which `max` ignores.
             stated = stated.max(variances[other]);
         }
@@ -196,6 +197,7 @@ fn variance(texels: &CoveredTexels<'_>, shown: &MapValues<'_>, texel: MapTexel) 
     if chart.is_some() {
         stated = variances[texel.place()].max(0.0);
     }
+    let Bounds { low, high } = values;
     let range = if low.x <= high.x { (high - low).as_dvec3() } else { DVec3::ZERO };
     let slope = range * HALF_A_TEXEL;
     let variance = slope * slope + f64::from(stated);
