@@ -15,9 +15,10 @@ use crate::final_gather::texel_radiance::TexelRadiance;
 use crate::radiosity::exchange::Resolution;
 use crate::radiosity::patches::{Patch, Patches};
 use crate::rebake::TexelSamples;
+use crate::report::StageNotes;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::sources::direct::Direct;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::{BakeError, BakeOptions};
 
 /// Per triangle of the scene: the triangle itself; while the hierarchy is built, its corners without and with an index,
 /// and two nodes of the binary tree; in the finished hierarchy, its lane of a block that may be half empty, and its
@@ -113,7 +114,7 @@ pub(crate) fn check_texels(
 }
 
 /// Chooses the resolution of the patches and form factors: that of the quality, or the finest that fits into memory.
-/// Writes the estimated memory into the report, and a warning if the resolution was reduced.
+/// Warns if it was reduced.
 ///
 /// # Errors
 /// [`BakeError::Memory`] if even the coarsest resolution does not fit.
@@ -121,14 +122,13 @@ pub(crate) fn resolution(
     texels: &CoveredTexels<'_>,
     sample_bytes: u64,
     options: &BakeOptions,
-    report: &mut BakeReport,
-) -> Result<Resolution, BakeError> {
+) -> Result<(Resolution, StageNotes), BakeError> {
     let effort = options.effort();
     let CoveredTexels { scene, layout, list: texels, contacts, side: texel_side, .. } = texels;
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let requested_rays = effort.form_factor_rays(texels.len(), options.error);
-    let mut resolution = Resolution { patch_side: side, form_factor_rays: requested_rays };
+    let mut resolution = Resolution { patch_side: side, form_factor_rays: requested_rays, memory_bytes: 0 };
     let triangles = scene.triangles.len() as u64;
     let covered = texels.len() as u64;
     let footprint_points = texels.iter().map(|texel| match &texel.footprint {
@@ -144,7 +144,7 @@ pub(crate) fn resolution(
     loop {
         let needed =
             texel_bytes + triangles * TRIANGLE_BYTES + OTHER_BYTES + exchange_bytes(&resolution, patches);
-        report.memory_bytes = needed;
+        resolution.memory_bytes = needed;
         let Some(limit) = options.memory.filter(|&limit| needed > limit) else { break };
         if resolution.form_factor_rays > effort.form_factor_rays {
             // The rays that only a large level gets go first.
@@ -160,8 +160,9 @@ pub(crate) fn resolution(
         is_coarsest = fewer == patches && resolution.form_factor_rays == 0;
         patches = fewer;
     }
+    let mut notes = StageNotes::default();
     if resolution.patch_side > side {
-        report.warnings.push(format!(
+        notes.warnings.push(format!(
             "{patches} patches instead of {requested_patches}, and {} form factor rays instead of {requested_rays}, so that the bake stays within {}",
             resolution.form_factor_rays,
             mebibytes(options.memory.unwrap_or_default())
@@ -169,9 +170,9 @@ pub(crate) fn resolution(
     }
     tracing::info!(
         "this bake needs about {} at most: {covered} texels, {triangles} triangles, {patches} patches",
-        mebibytes(report.memory_bytes)
+        mebibytes(resolution.memory_bytes)
     );
-    Ok(resolution)
+    Ok((resolution, notes))
 }
 
 /// Bytes for the patches, their form factors and the sampling guide.

@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use crate::cancel_token::CancelToken;
 use crate::checkpoint::checkpoint_file::ChunkKey;
 use crate::checkpoint::{CheckpointFile, Record};
-use crate::stage::Stage;
-use crate::{BakeError, BakeReport, StageTime};
+use crate::stage::{Stage, StageProfile};
+use crate::{BakeError, StageTime};
 
 /// The progress of a running bake, as passed to the callback of [`Bake::progress`](crate::Bake::progress).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +85,10 @@ pub(crate) struct BakeMonitor<'a> {
     clock: Clock,
     is_cut_short: bool,
     stage: Option<(Stage, Instant)>,
+    /// The time that each finished stage took, in order.
+    pub stages: Vec<StageTime>,
+    /// The time of those that cast rays.
+    pub casting_seconds: f64,
     /// Begin and end of the current pass, as fractions of the running stage.
     pass: (f32, f32),
     error: Option<f64>,
@@ -100,6 +104,8 @@ impl<'a> BakeMonitor<'a> {
             callback,
             clock,
             stage: None,
+            stages: Vec::new(),
+            casting_seconds: 0.0,
             pass: (0.0, 1.0),
             error: None,
             is_cut_short: false,
@@ -144,8 +150,8 @@ impl<'a> BakeMonitor<'a> {
     }
 
     /// Ends the running stage and begins `stage`.
-    pub fn stage(&mut self, stage: Stage, report: &mut BakeReport) -> Result<(), BakeError> {
-        self.end_stage(report);
+    pub fn stage(&mut self, stage: Stage) -> Result<(), BakeError> {
+        self.end_stage();
         self.stage = Some((stage, Instant::now()));
         self.pass = (0.0, 1.0);
         self.advance(0.0)
@@ -159,13 +165,13 @@ impl<'a> BakeMonitor<'a> {
         self.pass = (begin, (begin + (1.0 - begin) * share).min(MAX_PASS_END));
     }
 
-    /// Writes the time of the running stage into the report.
-    pub fn end_stage(&mut self, report: &mut BakeReport) {
+    /// Ends the running stage, and notes the time that it took.
+    pub fn end_stage(&mut self) {
         if let Some((stage, begun)) = self.stage.take() {
-            report.stages.push(StageTime {
-                stage: stage.profile().name.to_owned(),
-                seconds: begun.elapsed().as_secs_f64(),
-            });
+            let StageProfile { name, casts_rays, .. } = stage.profile();
+            let (stage, seconds) = (name.to_owned(), begun.elapsed().as_secs_f64());
+            self.casting_seconds += if casts_rays { seconds } else { 0.0 };
+            self.stages.push(StageTime { stage, seconds });
         }
     }
 

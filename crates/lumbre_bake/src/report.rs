@@ -269,7 +269,45 @@ pub struct BakeReport {
     pub skipped: Vec<String>,
 }
 
+/// What a stage reports besides its result and the figures of its own.
+#[derive(Debug, Default)]
+pub(crate) struct StageNotes {
+    /// Number of rays cast.
+    pub rays: u64,
+    /// As [`BakeReport::warnings`].
+    pub warnings: Vec<String>,
+    /// As [`BakeReport::skipped`].
+    pub skipped: Vec<String>,
+}
+
+impl StageNotes {
+    pub fn of_rays(rays: u64) -> Self {
+        Self { rays, ..Self::default() }
+    }
+
+    pub fn of_warnings(warnings: Vec<String>) -> Self {
+        Self { warnings, ..Self::default() }
+    }
+
+    pub fn of_skipped(what_and_why: impl Into<String>) -> Self {
+        Self { skipped: vec![what_and_why.into()], ..Self::default() }
+    }
+}
+
 impl BakeReport {
+    /// The result of a stage, whose notes are added to the report.
+    pub(crate) fn noted<T>(&mut self, (result, notes): (T, StageNotes)) -> T {
+        self.rays += notes.rays;
+        self.warnings.extend(notes.warnings);
+        self.skipped.extend(notes.skipped);
+        result
+    }
+
+    /// Mean irradiance, mean of the channels, W/m².
+    pub(crate) fn mean_of_channels(&self) -> f64 {
+        self.mean_irradiance.iter().sum::<f64>() / 3.0
+    }
+
     /// The sources of the estimated error in one line, without minor ones; `None` if there is no error.
     pub fn error_parts_in_words(&self) -> Option<String> {
         /// Parts with a smaller fraction of the squared error are minor.

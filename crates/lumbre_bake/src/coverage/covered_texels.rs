@@ -5,16 +5,19 @@ use super::contact_lines::ContactLines;
 use super::divided_texels::{contact_lines, divided_texels};
 use super::footprint::{Texel, footprints, open_texels};
 use super::hidden::remove_hidden;
+use crate::BakeError;
 use crate::monitor::BakeMonitor;
+use crate::report::StageNotes;
 use crate::scene::{BakeScene, LightmapLayout};
 use crate::texel_index::{CoveredTexel, MapTexel};
-use crate::{BakeError, BakeReport};
 
 /// The texels that show a surface, map by map and row by row. Lists "of the covered texels" are in this order.
 pub(crate) struct CoveredTexels<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
     pub list: Vec<Texel>,
+    /// How many of them other geometry hides in part or whole.
+    pub hidden: usize,
     /// Per texel of all maps, the covered texel there; `None` where no surface is in the open.
     open_by_place: Vec<Option<CoveredTexel>>,
     /// The chart of every triangle of the scene.
@@ -33,8 +36,7 @@ impl<'a> CoveredTexels<'a> {
         scene: &'a BakeScene,
         layout: &'a LightmapLayout,
         monitor: &mut BakeMonitor<'_>,
-        report: &mut BakeReport,
-    ) -> Result<Self, BakeError> {
+    ) -> Result<(Self, StageNotes), BakeError> {
         let (mut list, charts, contacts) = monitor.run_interruptible(0.0, || {
             (footprints(scene, layout), charts(scene), contact_lines(scene, layout))
         })?;
@@ -44,15 +46,13 @@ impl<'a> CoveredTexels<'a> {
             let divided = divided_texels(&list, &open_by_place(layout, &list), &contacts);
             divided.iter().map(|texel| list[texel.place()].index).collect()
         })?;
-        (report.hidden_texels, report.rays) =
-            remove_hidden(scene, layout, &mut list, &contacts, &maybe_divided, monitor)?;
+        let (hidden, rays) = remove_hidden(scene, layout, &mut list, &contacts, &maybe_divided, monitor)?;
         let open_by_place = open_by_place(layout, &list);
         let divided = monitor.run_interruptible(1.0, || divided_texels(&list, &open_by_place, &contacts))?;
-        report.texels = layout.texels;
-        report.coverage = list.len() as f64 / layout.texels.max(1) as f64;
         let area: f64 = scene.triangles.iter().map(|triangle| f64::from(triangle.area)).sum();
         let side = (area / list.len().max(1) as f64).sqrt() as f32;
-        Ok(Self { scene, layout, list, open_by_place, charts, divided, contacts, side })
+        let texels = Self { scene, layout, list, hidden, open_by_place, charts, divided, contacts, side };
+        Ok((texels, StageNotes::of_rays(rays)))
     }
 
     /// The covered texel at a place of the maps, if it shows a surface in the open.

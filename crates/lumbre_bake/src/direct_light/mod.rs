@@ -24,6 +24,7 @@ use crate::direct_light::local_light::LocalLight;
 use crate::direct_light::shafts::Shafts;
 use crate::direct_light::shared_light::SharedLight;
 use crate::monitor::BakeMonitor;
+use crate::report::StageNotes;
 use crate::sample_allocation::{SampleAllocation, allocate};
 use crate::sampling::{Sequence, Stream};
 use crate::scene::LightmapLayout;
@@ -31,7 +32,7 @@ use crate::sources::direct::{Direct, VisibilitySummary};
 use crate::sources::light_sources::Sources;
 use crate::sources::sampled_receiver::SampledReceiver;
 use crate::texel_index::CoveredTexel;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::{BakeError, BakeOptions};
 
 /// How far around a texel that saw a penumbra others may be in it too, in texels.
 const REACH: u32 = 2;
@@ -63,8 +64,7 @@ pub(crate) fn direct_light(
     known: &[Option<Direct>],
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<DirectLight, BakeError> {
+) -> Result<(DirectLight, StageNotes), BakeError> {
     let mut sampler = SourceSampler::new(sources, texels, known, options, monitor)?;
     let mut direct = sampler.first_pass(monitor)?;
     sampler.share_penumbrae(&mut direct, monitor)?;
@@ -103,8 +103,8 @@ pub(crate) fn direct_light(
         shared.add_to(&mut direct);
     }
     let rays = sampler.unknown().map(|texel| u64::from(direct[texel.place()].rays));
-    report.rays += rays.sum::<u64>();
-    Ok(DirectLight { texels: direct, local })
+    let notes = StageNotes::of_rays(rays.sum());
+    Ok((DirectLight { texels: direct, local }, notes))
 }
 
 /// Samples the direct light of the texels that are not known from a previous bake, with everything that all passes

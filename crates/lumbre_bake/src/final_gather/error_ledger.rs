@@ -184,8 +184,9 @@ impl ErrorLedger<'_> {
             (Term::TexelsRead, Some(gather)) => gather.gathered[index].texel_variance(),
             (Term::Patches, Some(gather)) => gather.patches[index].rest,
             (Term::Solver, Some(gather)) => {
-                let unsolved =
-                    gather.residual_bound as f32 * mean(&gather.denoised.estimates[index]).element_sum() / 3.0;
+                let unsolved = gather.residual_bound as f32
+                    * mean(&gather.denoised.estimates[index]).element_sum()
+                    / 3.0;
                 unsolved * unsolved
             }
             (Term::ReusedGather, Some(gather)) => {

@@ -1,10 +1,10 @@
 //! The error of all lightmaps together, as the report states it. The errors of single texels are in `error_ledger`.
 
 use super::error_ledger::{ErrorLedger, open_sum, relative_to, root};
+use crate::ErrorPart;
 use crate::coverage::footprint::Texel;
 use crate::direct_light::local_light::LocalLight;
 use crate::squared_errors::SquaredErrors;
-use crate::{BakeReport, ErrorPart};
 
 /// The expected error over all texels that are not hidden.
 pub(crate) struct MapError {
@@ -14,6 +14,8 @@ pub(crate) struct MapError {
     pub relative: f64,
     /// RMSE relative to the mean irradiance of the map.
     pub of_mean: f64,
+    /// What it is made of, the largest part first.
+    pub parts: Vec<ErrorPart>,
 }
 
 impl MapError {
@@ -33,14 +35,7 @@ impl MapError {
             relative_squares,
             relative: root(relative_squares / open),
             of_mean: relative_to(mean, open_sum(texels, &errors.expected) / open),
+            parts: ledger.parts(texels, local),
         }
-    }
-
-    /// Writes the error, its `parts`, and whether it is at most `target`, into the report.
-    pub fn write_report(&self, target: f64, parts: Vec<ErrorPart>, report: &mut BakeReport) {
-        report.estimated_error = self.relative;
-        report.error_of_mean = self.of_mean;
-        report.error_reached = self.relative <= target;
-        report.error_parts = parts;
     }
 }

@@ -40,6 +40,8 @@ pub(crate) struct RadianceCache<'a> {
     /// Per patch, the distance below which it is too coarse to be read, canonical units: nearer rays make another
     /// bounce.
     pub min_read_distance: &'a [f32],
+    /// Bound of the error of `patch_indirect` by the solver, relative to it.
+    pub residual_bound: f64,
     /// Radius on a surface within which the errors that rounds leave in texels are correlated, canonical units.
     pub correlation_radius: f32,
     /// Which regions the light of each region comes from: as the patches know it, and with all `discoveries`.
@@ -85,6 +87,7 @@ impl<'a> RadianceCache<'a> {
             patch_indirect: &exchange.indirect,
             patch_error: &exchange.indirect_error,
             min_read_distance: &exchange.near,
+            residual_bound: exchange.residual_bound,
             guide: Cow::Borrowed(&exchange.guide),
             guide_of_patches: &exchange.guide,
             discoveries: Vec::new(),

@@ -23,11 +23,12 @@ use crate::denoise::replicates::{Estimates, REPLICATES, mean};
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
 use crate::monitor::{BakeMonitor, Clock};
+use crate::report::StageNotes;
 use crate::sample_allocation::{SampleAllocation, added, allocate_within};
 use crate::sources::direct::Direct;
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
-use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
+use crate::{BakeError, BakeOptions, Ended, ErrorAtTime};
 
 /// More rays are not worthwhile if the error that they can reduce is less than this fraction of the squared error.
 const MIN_REDUCIBLE: f64 = 0.1;
@@ -82,6 +83,15 @@ impl IndirectLight {
     }
 }
 
+/// The figures of the final gather, as in [`BakeReport`](crate::BakeReport).
+pub(crate) struct GatherReport {
+    pub error: MapError,
+    pub curve: Vec<ErrorAtTime>,
+    pub ended: Ended,
+    pub leaked_rays: u64,
+    pub gather_rays: f64,
+}
+
 /// Gathers bounced light in rounds, starting with the sums `reused` from a previous bake. Afterwards the cache also
 /// holds the gathered light, for rays of later stages.
 pub(crate) fn gather(
@@ -91,12 +101,12 @@ pub(crate) fn gather(
     reused: Option<&ReusedGather>,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<IndirectLight, BakeError> {
+) -> Result<((IndirectLight, GatherReport), StageNotes), BakeError> {
     let list = &texels.list;
     let leaked_before = cache.scene.leaks.count();
     let neighbourhoods = monitor.run_interruptible(0.0, || Neighbourhoods::new(texels, &[]))?;
     let planner = RoundPlanner::new(&neighbourhoods, texels, direct, reused, options);
+    let mut curve = Vec::new();
     let no_sums = || vec![GatherSums::default(); list.len()];
     let mut gathered = reused.map_or_else(no_sums, |reused| reused.gathered.clone());
     let wanted = planner.first_samples(&gathered);
@@ -109,20 +119,23 @@ pub(crate) fn gather(
     let mut plan: Option<RoundPlan> = None;
     let mut stalled_rounds = 0;
     let mut reads = TexelReads::new(cache.patches.mean_reflectance(), &gathered);
-    let result = loop {
+    let (result, ended) = loop {
         let begun = monitor.seconds();
-        let result = planner.evaluate(&gathered, &reads, monitor, report)?;
+        let result = planner.evaluate(&gathered, &reads, cache.residual_bound, monitor)?;
+        let error = result.error.relative;
+        let is_reached = error <= options.error;
+        curve.push(ErrorAtTime { seconds: result.seconds, error });
         // A round needs time for its rays, and for another evaluation.
         let affordable = speed.affordable_samples(monitor.seconds() - begun, monitor.clock());
         let next = planner.plan(&gathered, &result, decide(monitor, affordable)?);
         let is_late = !in_time || monitor.clock().is_over() || next.is_late;
-        let is_hardly_reducible = next.reducible_error <= MIN_REDUCIBLE * result.relative_squares;
+        let is_hardly_reducible = next.reducible_error <= MIN_REDUCIBLE * result.error.relative_squares;
         let has_stalled = plan.as_ref().is_some_and(|plan| plan.has_stalled(next.reducible_error));
         stalled_rounds = if has_stalled { stalled_rounds + 1 } else { 0 };
-        report.ended = Ended::after(report.error_reached, is_late || monitor.is_late(), next.is_last);
+        let ended = Ended::after(is_reached, is_late || monitor.is_late(), next.is_last);
         let rays_gain_nothing = is_hardly_reducible || stalled_rounds == MAX_STALLED_ROUNDS;
-        if report.error_reached || is_late || rays_gain_nothing || is_all_reused || next.is_last {
-            break result;
+        if is_reached || is_late || rays_gain_nothing || is_all_reused || next.is_last {
+            break (result, ended);
         }
         let variances = &result.reducible.expected;
         monitor.run_interruptible(1.0, || {
@@ -137,17 +150,18 @@ pub(crate) fn gather(
         speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
         plan = Some(next);
     };
-    let RoundResult { light, variances, .. } = result;
+    let RoundResult { light, variances, error, .. } = result;
     monitor.run_interruptible(1.0, || {
         cache.texels.set_indirect(list, &gathered, &light, &variances.expected);
     })?;
-    report.leaked_rays = cache.scene.leaks.count() - leaked_before;
-    report.rays += gathered.iter().map(|sums| sums.rays).sum::<u64>();
     // Texels for which there was no time have no rays: their sums are those of a neighbour, or the light of their patch.
     let cast = gathered.iter().filter(|sums| sums.rays > 0);
     let cast: u64 = cast.map(|sums| u64::from(sums.samples) * REPLICATES as u64).sum();
-    report.gather_rays = cast as f64 / planner.open.len().max(1) as f64;
-    Ok(IndirectLight { light, variances, gathered })
+    let gather_rays = cast as f64 / planner.count();
+    let leaked_rays = cache.scene.leaks.count() - leaked_before;
+    let rays = gathered.iter().map(|sums| sums.rays).sum::<u64>();
+    let report = GatherReport { error, curve, ended, leaked_rays, gather_rays };
+    Ok(((IndirectLight { light, variances, gathered }, report), StageNotes::of_rays(rays)))
 }
 
 /// Samples per replicate, of all texels together.
@@ -200,8 +214,9 @@ struct RoundResult {
     variances: SquaredErrors,
     /// The part of `variances` that more rays reduce.
     reducible: SquaredErrors,
-    /// Sum over the open texels of their squared errors, each relative to the light around its texel.
-    relative_squares: f64,
+    /// The error of the whole map, and the seconds that the bake had taken when it was known.
+    error: MapError,
+    seconds: f64,
 }
 
 /// What the next round should cast.
@@ -209,7 +224,7 @@ struct RoundPlan {
     wanted: Vec<SampleAllocation>,
     /// Samples of each replicate that it adds, of all texels together.
     added: u64,
-    /// The part of [`RoundResult::relative_squares`] that rays reduce.
+    /// The part of [`MapError::relative_squares`] that rays reduce.
     reducible_error: f64,
     /// The quality's rays are spent, or no texel would get more: there is no next round.
     is_last: bool,
@@ -264,13 +279,13 @@ impl<'a> RoundPlanner<'a> {
         without_samples.map(|texel| SampleAllocation { texel, samples }).collect()
     }
 
-    /// Estimates the light from the samples, smooths it, and estimates its errors, which are written into the report.
+    /// Estimates the light from the samples, smooths it, and estimates its errors. `residual_bound` is the solver's.
     fn evaluate(
         &self,
         gathered: &[GatherSums],
         reads: &TexelReads,
+        residual_bound: f64,
         monitor: &mut BakeMonitor<'_>,
-        report: &mut BakeReport,
     ) -> Result<RoundResult, BakeError> {
         let (neighbourhoods, texels, local) = (self.neighbourhoods, self.texels, self.local);
         let raw: Vec<Estimates> = gathered.par_iter().map(GatherSums::estimates).collect();
@@ -284,20 +299,18 @@ impl<'a> RoundPlanner<'a> {
             gathered,
             denoised: &denoised,
             patches: &patches,
-            residual_bound: report.residual_bound,
+            residual_bound,
             kept: self.reuse_error,
         };
         let ledger = ErrorLedger { direct: self.direct, gather: Some(gather), light: total as f32 };
         let variances = ledger.total();
-        let map_error = MapError::new(&ledger, &variances, texels, local, total);
-        let parts = monitor.run_interruptible(1.0, || ledger.parts(texels, local))?;
-        map_error.write_report(self.options.error, parts, report);
-        report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
-        monitor.note_error(report.estimated_error);
+        let new_error = || MapError::new(&ledger, &variances, texels, local, total);
+        let error = monitor.run_interruptible(1.0, new_error)?;
+        let seconds = monitor.seconds();
+        monitor.note_error(error.relative);
         monitor.advance(1.0)?;
         let light = without_patch_bias(&denoised.estimates, &patches);
-        let (reducible, relative_squares) = (denoised.errors(), map_error.relative_squares);
-        Ok(RoundResult { light, variances, reducible, relative_squares })
+        Ok(RoundResult { light, variances, reducible: denoised.errors(), error, seconds })
     }
 
     /// Allocates the rays of the next round such that they reduce the reducible part of the error to what is needed to
@@ -309,7 +322,7 @@ impl<'a> RoundPlanner<'a> {
         let read: Vec<f32> = gathered.par_iter().map(GatherSums::squared_read_error).collect();
         let by_rays = self.local.relative_errors(&result.reducible.with(&read));
         let reducible_error = open_sum(self.texels, &by_rays.expected);
-        let irreducible_error = result.relative_squares - reducible_error;
+        let irreducible_error = result.error.relative_squares - reducible_error;
         let requested = self.count() * self.options.error.powi(2);
 
         let samples: Vec<u32> = gathered.iter().map(|sums| sums.samples).collect();
@@ -317,7 +330,7 @@ impl<'a> RoundPlanner<'a> {
         let limit = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
         let budget = limit.saturating_sub(cast);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
-        let requested_over_left = requested / result.relative_squares.max(f64::MIN_POSITIVE);
+        let requested_over_left = requested / result.error.relative_squares.max(f64::MIN_POSITIVE);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP;
         let (target, budget) = match is_small_step {
             true => {

@@ -14,13 +14,13 @@ use crate::denoise::replicates::REPLICATES;
 use crate::final_gather::gather_sums::GatherSums;
 use crate::final_gather::radiance_cache::RadianceCache;
 use crate::monitor::BakeMonitor;
-use crate::report::ResolutionReport;
+use crate::report::{ResolutionReport, StageNotes};
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
 use crate::scene::{BakeScene, Receiver, SurfaceHit};
 use crate::sources::light_sources::Sources;
 use crate::stage::Stage;
 use crate::texel_index::MapTexel;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::{BakeError, BakeOptions};
 
 /// The points get one part in this many of the bake's rays, and never fewer than take no noticeable time.
 const RAYS_DIVISOR: u64 = 20;
@@ -50,24 +50,23 @@ pub(crate) struct DensePoint {
 }
 
 /// The points that the finished map is compared with; none if the comparison is switched off, or the time is up.
-/// `cache` is `None` where nothing bounces.
+/// `cache` is `None` where nothing bounces; `rays` is how many rays the bake has cast so far.
 pub(crate) fn dense_points(
     sources: &Sources<'_>,
     cache: Option<&RadianceCache<'_>>,
+    rays: u64,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<Vec<DensePoint>, BakeError> {
+) -> Result<(Vec<DensePoint>, StageNotes), BakeError> {
     if !options.resolution_error || monitor.clock().is_over() {
         let why = if options.resolution_error { "the time is up" } else { "switched off" };
-        report.skipped.push(format!("resolution error: {why}"));
-        return Ok(Vec::new());
+        return Ok((Vec::new(), StageNotes::of_skipped(format!("resolution error: {why}"))));
     }
-    monitor.stage(Stage::Resolution, report)?;
+    monitor.stage(Stage::Resolution)?;
     let baker = PointBaker { scene: sources.scene, sources, cache };
-    let points = baker.bake_points(report.rays, options, monitor)?;
-    report.rays += points.iter().map(|point| point.rays).sum::<u64>();
-    Ok(points)
+    let points = baker.bake_points(rays, options, monitor)?;
+    let notes = StageNotes::of_rays(points.iter().map(|point| point.rays).sum());
+    Ok((points, notes))
 }
 
 /// Computes the light at single points.

@@ -84,7 +84,7 @@ mod tests {
     use crate::scene::laid_out::laid_out;
     use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
     use crate::sources::light_sources::Sources;
-    use crate::{BakeOptions, BakeReport, Density};
+    use crate::{BakeOptions, Density};
 
     /// For a block in a room under a lamp, the light of patches by texels agrees with that by 1,024 rays to the lamp
     /// from each patch.
@@ -107,9 +107,9 @@ mod tests {
         let (layout, scene) = laid_out(&input.objects, input.space(), &options);
         let sources = Sources::new(&scene, Vec::new(), input.lights.clone(), Vec3::ZERO);
         let mut carry_on = |_| ControlFlow::Continue(());
-        let (mut monitor, mut report) = (BakeMonitor::new(&mut carry_on, None), BakeReport::default());
-        let texels = CoveredTexels::new(&scene, &layout, &mut monitor, &mut report).unwrap();
-        let direct = direct_light(&sources, &texels, &[], &options, &mut monitor, &mut report).unwrap();
+        let mut monitor = BakeMonitor::new(&mut carry_on, None);
+        let (texels, _) = CoveredTexels::new(&scene, &layout, &mut monitor).unwrap();
+        let (direct, _) = direct_light(&sources, &texels, &[], &options, &mut monitor).unwrap();
         let patches = Patches::new(&scene, 6.0 * texels.side);
         let light = patch_light(&texels, &direct, &patches);
 

@@ -136,10 +136,9 @@ impl<'a> Changes<'a> {
         let bounds = bounds(texels);
         let after = bounds.into_iter().zip(&changed).filter(|(_, changed)| **changed);
         let after = after.map(|(bounds, _)| ChangedBox { bounds, former_exitance: None });
-        let before = gone.iter().map(|object| ChangedBox {
-            bounds: object.bounds,
-            former_exitance: Some(object.exitance),
-        });
+        let before = gone
+            .iter()
+            .map(|object| ChangedBox { bounds: object.bounds, former_exitance: Some(object.exitance) });
         let boxes: Vec<ChangedBox> = after.chain(before).filter(|b| !b.bounds.is_empty()).collect();
         let names = names(objects, &changed, &gone, lights_or_sky_changed);
         let (known, former_light) = known(texels, &unchanged);

@@ -28,13 +28,14 @@ use crate::radiosity::exchange::Exchange;
 use crate::radiosity::form_factors::FormFactors;
 use crate::radiosity::patches::{Patch, Patches};
 use crate::radiosity::solution::gather;
+use crate::report::StageNotes;
 use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, Receiver, SurfaceHit};
 use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
 use crate::texel_index::MapTexel;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::{BakeError, BakeOptions};
 
 /// Rays from a patch or from a block of texels. Every other one is aimed at what has changed.
 const RAYS: u32 = 32;
@@ -45,12 +46,8 @@ const NEAR_BOX: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
-/// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The report counts about how many rays
+/// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The notes count about how many rays
 /// it took to decide.
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the light of three stages, and the frame that every stage takes"
-)]
 pub(crate) fn reused_gather(
     changes: &Changes<'_>,
     sources: &Sources<'_>,
@@ -59,8 +56,7 @@ pub(crate) fn reused_gather(
     (exchange, factors): (&Exchange, &FormFactors),
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<ReusedGather, BakeError> {
+) -> Result<(ReusedGather, StageNotes), BakeError> {
     let change =
         monitor.run_interruptible(1.0, || IndirectChange::new(sources, changes, texels, &direct.texels))?;
     let unknown = if changes.nothing_changed { Vec::new() } else { change.unknown_backs(&exchange.patches) };
@@ -73,8 +69,7 @@ pub(crate) fn reused_gather(
     let of_patches = change.of_patches(light, factors, options, monitor)?;
     let light = PatchLight { change: &of_patches, ..light };
     let reused = change.keep(light, &direct.local, options, monitor)?;
-    report.rays += change.rays(&of_patches);
-    Ok(reused)
+    Ok((reused, StageNotes::of_rays(change.rays(&of_patches))))
 }
 
 /// The light before and after, as far as the estimate needs it.
@@ -368,8 +363,7 @@ impl<'a> IndirectChange<'a> {
             let (mut from, mut to) = (0.0f32, distance);
             for axis in 0..3 {
                 let inverse = 1.0 / direction[axis];
-                let (a, b) =
-                    ((low[axis] - origin[axis]) * inverse, (high[axis] - origin[axis]) * inverse);
+                let (a, b) = ((low[axis] - origin[axis]) * inverse, (high[axis] - origin[axis]) * inverse);
                 // Both are NaN for a ray in the plane of a flat box, and `min` and `max` ignore them. (Only one is NaN
                 // for a ray in the plane of a side of another box: the ray then counts as outside.)
                 from = from.max(a.min(b));

@@ -13,7 +13,7 @@ pub(crate) fn rebake_report(
     report: &BakeReport,
 ) -> RebakeReport {
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count();
-    let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
+    let mean = report.mean_of_channels();
     let error = kept.map_or(0.0, |kept| kept.error(open));
     RebakeReport {
         whole: String::new(),

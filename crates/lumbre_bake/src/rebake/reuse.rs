@@ -10,19 +10,21 @@ use crate::final_gather::lit_texels::LitTexels;
 use crate::final_gather::reused_gather::ReusedGather;
 use crate::scene::{Canonical, SceneObject, StaticScene, density_of};
 use crate::sources::light_sources::Sources;
-use crate::{BakeOptions, BakeReport, RebakeReport};
+use crate::{BakeOptions, RebakeReport};
 use glam::Vec3;
 
 /// The former bake, if it can be used, and the identity of this one.
 pub(crate) struct Reuse<'a> {
     hashes: Hashes,
     former: Option<&'a Content>,
+    /// Why there was a former bake, but it cannot be used.
+    refusal: Option<String>,
     /// Hash of everything that the bits of this bake follow from, former bakes included.
     pub identity: ContentHash,
 }
 
 impl<'a> Reuse<'a> {
-    /// Decides whether the samples of a `former` bake can be used; the report says why not. `limited` says that memory is limited and samples take some
+    /// Decides whether the samples of a `former` bake can be used. `limited` says that memory is limited and samples take some
     /// of it, so that other patches may fit.
     pub fn new(
         former: Option<&'a Samples>,
@@ -30,17 +32,15 @@ impl<'a> Reuse<'a> {
         limited: bool,
         input: &StaticScene,
         options: &BakeOptions,
-        report: &mut BakeReport,
     ) -> Self {
-        let usable =
-            |former: &&Content| match former.check_use(&hashes, &input.objects, input.space(), options) {
-                Ok(()) => true,
-                Err(reason) => {
-                    report.rebake = Some(RebakeReport { whole: reason, ..RebakeReport::default() });
-                    false
-                }
-            };
-        let former = former.map(|samples| &samples.0).filter(usable);
+        let space = input.space();
+        let checked = former
+            .map(|samples| samples.0.check_use(&hashes, &input.objects, space, options).map(|()| &samples.0));
+        let (former, refusal) = match checked {
+            Some(Ok(former)) => (Some(former), None),
+            Some(Err(reason)) => (None, Some(reason)),
+            None => (None, None),
+        };
         let identity = match former {
             None => hashes.content,
             // If nothing has changed, everything is kept, with the same bits.
@@ -48,7 +48,17 @@ impl<'a> Reuse<'a> {
             Some(former) => hashes.content.made_from(&former.identity),
         };
         let identity = if limited { identity.made_from(&hashes.sampling) } else { identity };
-        Self { hashes, former, identity }
+        Self { hashes, former, refusal, identity }
+    }
+
+    /// Hash of what is baked.
+    pub fn content_hash(&self) -> ContentHash {
+        self.hashes.content
+    }
+
+    /// The report on a former bake that cannot be used.
+    pub fn refusal(&self) -> Option<RebakeReport> {
+        self.refusal.clone().map(|whole| RebakeReport { whole, ..RebakeReport::default() })
     }
 
     /// Returns true if there is a former bake that can be used.

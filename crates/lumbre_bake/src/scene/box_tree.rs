@@ -81,7 +81,8 @@ fn build(
     end: usize,
     nodes: &mut Vec<Node>,
 ) {
-    let bounds: Bounds<Vec3> = items[first..end].iter().flat_map(|&index| triangles[index as usize]).collect();
+    let bounds: Bounds<Vec3> =
+        items[first..end].iter().flat_map(|&index| triangles[index as usize]).collect();
     let (index, count) = (nodes.len(), end - first);
     let is_leaf = count <= MAX_LEAF_TRIANGLES || stop.is_cancelled();
     nodes.push(Node { bounds, first: first as u32, count: if is_leaf { count as u32 } else { 0 } });

@@ -123,7 +123,10 @@ mod tests {
         assert!(rooms_of(&block).is_empty());
         let both = [room.clone(), block].concat();
         let rooms = rooms_of(&both);
-        assert_eq!((rooms.len(), rooms[0].bounds), (1, Bounds { low: Vec3::splat(-2.0), high: Vec3::splat(2.0) }));
+        assert_eq!(
+            (rooms.len(), rooms[0].bounds),
+            (1, Bounds { low: Vec3::splat(-2.0), high: Vec3::splat(2.0) })
+        );
         assert!(all_within(&rooms, both.iter().copied()));
         assert!(!all_within(&rooms, std::iter::once([Vec3::ZERO, Vec3::X, Vec3::Y * 3.0])));
         assert!(!all_within(&rooms_of(&both[1..]), room.iter().copied()));

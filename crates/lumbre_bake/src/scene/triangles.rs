@@ -371,8 +371,7 @@ fn unmark_hollow_solids(
             solids.len()
         ));
     }
-    let is_hollow =
-        |(_, bounds): &&Solid| too_many || rooms.iter().any(|room| room.is_within(*bounds));
+    let is_hollow = |(_, bounds): &&Solid| too_many || rooms.iter().any(|room| room.is_within(*bounds));
     // In ascending order, as objects and their pieces are, which the binary search needs.
     let hollow: Vec<u32> = solids.iter().filter(is_hollow).map(|(number, ..)| *number).collect();
     for triangle in triangles {

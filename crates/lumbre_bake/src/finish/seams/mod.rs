@@ -21,8 +21,8 @@ use glam::Vec3;
 
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::monitor::BakeMonitor;
-use crate::report::SeamReport;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::report::{SeamReport, StageNotes};
+use crate::{BakeError, BakeOptions};
 use least_squares::{Patience, Unknowns};
 
 /// The values of the maps, per texel of all maps.
@@ -33,15 +33,6 @@ pub(crate) struct MapValues<'a> {
     pub variances: &'a mut [f32],
 }
 
-/// The outcome of closing seams.
-struct Closed {
-    /// What was done, or the reason why nothing was.
-    pub report: Result<SeamReport, &'static str>,
-    pub rays: u64,
-    /// A warning if some edges were not compared with all others.
-    pub warning: Option<String>,
-}
-
 /// Closes the seams of the maps, unless that is switched off, and reports the outcome. How far a texel is moved is
 /// added to its error. `mean` is the mean irradiance of the open texels, mean of the channels.
 pub(crate) fn close_seams(
@@ -50,38 +41,34 @@ pub(crate) fn close_seams(
     shown: MapValues<'_>,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<(), BakeError> {
+) -> Result<(SeamReport, StageNotes), BakeError> {
     if !options.seams {
-        report.skipped.push("seams: switched off".into());
-        return Ok(());
+        return Ok((SeamReport::default(), StageNotes::of_skipped("seams: switched off")));
     }
     let patience = if monitor.clock().is_over() { Patience::LATE } else { Patience::WHOLE };
-    let closed = monitor.run_interruptible(0.0, || close(texels, mean, shown, patience))?;
-    report.rays += closed.rays;
-    report.warnings.extend(closed.warning);
-    match closed.report {
-        Ok(closed) => report.seams = closed,
-        Err(reason) => report.skipped.push(format!("seams: {reason}")),
-    }
-    Ok(())
+    monitor.run_interruptible(0.0, || close(texels, mean, shown, patience))
 }
 
-fn close(texels: &CoveredTexels<'_>, mean: f64, shown: MapValues<'_>, patience: Patience) -> Closed {
+fn close(
+    texels: &CoveredTexels<'_>,
+    mean: f64,
+    shown: MapValues<'_>,
+    patience: Patience,
+) -> (SeamReport, StageNotes) {
     if mean.is_nan() || mean <= 0.0 {
-        return Closed { report: Err("the maps are black"), rays: 0, warning: None };
+        return (SeamReport::default(), StageNotes::of_skipped("seams: the maps are black"));
     }
     let edges = edges::borders(texels.scene);
     let seams = samples::Sampling { texels, filled: shown.light, edges: &edges }.all();
-    let (rays, crowded) = (seams.rays, seams.crowded);
-    let warning = (crowded > 0).then(|| {
-        format!("so many borders of charts lie in one place that {crowded} of them were not compared with all others; seams may show there")
-    });
+    let mut notes = StageNotes::of_rays(seams.rays);
+    if seams.crowded > 0 {
+        notes.warnings.push(format!("so many borders of charts lie in one place that {} of them were not compared with all others; seams may show there", seams.crowded));
+    }
     if seams.samples.is_empty() {
-        return Closed { report: Err("no two borders of charts join smoothly in one place"), rays, warning };
+        notes.skipped.push("seams: no two borders of charts join smoothly in one place".into());
+        return (SeamReport::default(), notes);
     }
     let unknowns = Unknowns::new(texels, &shown, &seams.samples);
-    let mut report = unknowns.solve(&seams.samples, shown, mean, patience, &texels.scene.stop);
-    report.edges = seams.pairs;
-    Closed { report: Ok(report), rays, warning }
+    let report = unknowns.solve(&seams.samples, shown, mean, patience, &texels.scene.stop);
+    (SeamReport { edges: seams.pairs, ..report }, notes)
 }
