@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::monitor::BakeMonitor;
 use crate::report::StageNotes;
-use crate::scene::{BakeScene, Canonical, LightmapLayout, StaticScene, lay_out};
+use crate::scene::{BakeScene, Canonical, Layouter, LightmapLayout, StaticScene};
 use crate::sources::emitters::{Emitter, coarse_textures, emitters};
 use crate::sources::light_sources::{Sources, shines_inside_only};
 use crate::{BakeError, BakeOptions};
@@ -21,9 +21,9 @@ pub(crate) fn layout(
 ) -> Result<(LightmapLayout, StageNotes), BakeError> {
     let (input, options, stop) = (Arc::clone(input), *options, monitor.stop().clone());
     monitor.run_detached(0.0, move || {
-        let mut warnings = Vec::new();
-        let layout = lay_out(&input.objects, space, density, &options, &stop, &mut warnings)?;
-        Ok((layout, StageNotes::of_warnings(warnings)))
+        let mut layouter = Layouter { space, density, options: &options, stop: &stop, warnings: Vec::new() };
+        let layout = layouter.lay_out(&input.objects)?;
+        Ok((layout, StageNotes::of_warnings(layouter.warnings)))
     })?
 }
 

@@ -101,37 +101,214 @@ pub(crate) fn density_of(objects: &[SceneObject], space: Canonical, options: &Ba
     }
 }
 
-/// Lays out every object, at `density` texels per canonical unit.
-pub(crate) fn lay_out(
-    objects: &[SceneObject],
-    space: Canonical,
-    density: f64,
-    options: &BakeOptions,
-    stop: &CancelToken,
-    warnings: &mut Vec<String>,
-) -> Result<LightmapLayout, BakeError> {
-    let mut layout = LightmapLayout { density, ..LightmapLayout::default() };
-    let mut instances: HashMap<Vec<u64>, ObjectLayout> = HashMap::new();
-    let mut texels = 0u64;
-    for object in objects {
-        let key = instance_key(object, space);
-        let object_layout = match instances.get(&key) {
-            Some(known) => known.clone(),
-            None => {
-                let object_layout = lay_out_object(object, space, density, options, stop, warnings)?;
-                instances.insert(key, object_layout.clone());
-                object_layout
+/// How objects are laid out.
+pub(crate) struct Layouter<'a> {
+    pub space: Canonical,
+    /// Texels per canonical unit.
+    pub density: f64,
+    pub options: &'a BakeOptions,
+    pub stop: &'a CancelToken,
+    pub warnings: Vec<String>,
+}
+
+impl Layouter<'_> {
+    /// Lays out every object.
+    pub fn lay_out(&mut self, objects: &[SceneObject]) -> Result<LightmapLayout, BakeError> {
+        let mut layout = LightmapLayout { density: self.density, ..LightmapLayout::default() };
+        let mut instances: HashMap<Vec<u64>, ObjectLayout> = HashMap::new();
+        let mut texels = 0u64;
+        for object in objects {
+            let key = instance_key(object, self.space);
+            let ObjectLayout { meshes, moved, width, height } = match instances.get(&key) {
+                Some(known) => known.clone(),
+                None => instances.entry(key).insert_entry(self.lay_out_object(object)?).get().clone(),
+            };
+            texels += u64::from(width) * u64::from(height);
+            if texels > MAX_TEXELS {
+                return Err(BakeError::TooManyTexels { texels, limit: MAX_TEXELS });
+            }
+            layout.maps.push(MapLayout { meshes, moved, width, height, first: layout.texels });
+            layout.texels = texels as usize;
+        }
+        Ok(layout)
+    }
+
+    fn lay_out_object(&mut self, object: &SceneObject) -> Result<ObjectLayout, BakeError> {
+        let geometry = ObjectGeometry::new(object, self.space);
+        match self.with_given_uv1(object, &geometry) {
+            Some(layout) => Ok(layout),
+            None => self.unwrapped_anew(object, &geometry),
+        }
+    }
+
+    /// Texels per canonical unit of an object.
+    fn density_of(&self, object: &SceneObject) -> f64 {
+        self.density * object.lightmap_scale
+    }
+
+    /// The object's layout by the `uv1` that its meshes have, if that can hold a lightmap; warns if it has `uv1` that
+    /// cannot.
+    fn with_given_uv1(&mut self, object: &SceneObject, geometry: &ObjectGeometry) -> Option<ObjectLayout> {
+        let name = &object.name;
+        let Some(uv_area) = geometry.uv_area.filter(|&area| area > 0.0) else {
+            if geometry.uv_area == Some(0.0) && geometry.area > 0.0 {
+                let warning = "its TEXCOORD_1 covers no area, or is not finite; it was unwrapped anew";
+                self.warnings.push(format!("{name}: {warning}"));
+            }
+            return None;
+        };
+        let side = match self.options.density {
+            Density::MapSize(side) => scaled_side(object, side),
+            _ => limited_side(((geometry.area / uv_area).sqrt() * self.density_of(object)).ceil()),
+        };
+        self.warnings.push(match validate_uv1(&geometry.mesh, side, side) {
+            Ok(report) if report.is_sound() => {
+                let meshes = object.primitives.iter().map(|primitive| Arc::clone(&primitive.mesh));
+                let moved = vec![false; object.primitives.len()];
+                return Some(ObjectLayout { meshes: meshes.collect(), moved, width: side, height: side });
+            }
+            Ok(report) => format!(
+                "{name}: its TEXCOORD_1 cannot hold a lightmap at {side} x {side} texels ({} triangles out of range, {} \
+                 without area, {} overlapping pairs); it was unwrapped anew",
+                report.out_of_range.len(),
+                report.without_coverage.len(),
+                report.overlapping.len()
+            ),
+            Err(error) => format!("{name}: {error}; it was unwrapped anew"),
+        });
+        None
+    }
+
+    /// The object's layout by a new unwrap.
+    fn unwrapped_anew(
+        &mut self,
+        object: &SceneObject,
+        geometry: &ObjectGeometry,
+    ) -> Result<ObjectLayout, BakeError> {
+        let (object, moved) = free_second(object)?;
+        let name = &object.name;
+        if moved.contains(&true) {
+            self.warnings.push(format!(
+                "{name}: its textures' coordinates were moved from TEXCOORD_1, where the lightmap needs its own, to TEXCOORD_0, which \
+                 nothing else read"
+            ));
+        }
+        let may_continue = || !self.stop.is_cancelled();
+        let chart_angle = UnwrapOptions::default().chart_angle;
+        let charted = Charted::new(&geometry.mesh, &geometry.mesh.positions, chart_angle, &may_continue)
+            .map_err(|source| BakeError::Unwrap { object: name.clone(), source })?;
+        let charted = ChartedObject { name, charted, gap: self.options.gap };
+        let (unwrapped, width, height) = match self.options.density {
+            Density::MapSize(side) => {
+                let requested = scaled_side(&object, side);
+                let (unwrapped, side) = charted.into_square(geometry.area, requested)?;
+                if side > requested {
+                    self.warnings.push(format!(
+                        "{name}: its {} charts do not fit a map of {requested} x {requested} texels; it got one of {side} x {side}",
+                        charted.charted.len()
+                    ));
+                }
+                (unwrapped, side, side)
+            }
+            _ => {
+                let density = self.density_of(&object);
+                let (unwrapped, found) = charted.at_most(density)?;
+                if found < density {
+                    let share = 100.0 * found / density;
+                    self.warnings.push(format!(
+                        "{name}: its lightmap would exceed {LARGEST_SIDE} texels a side; it got {share:.0} % of the density"
+                    ));
+                }
+                let (width, height) = (unwrapped.width.max(1), unwrapped.height.max(1));
+                (unwrapped, width, height)
             }
         };
-        let ObjectLayout { meshes, moved, width, height } = object_layout;
-        texels += u64::from(width) * u64::from(height);
-        if texels > MAX_TEXELS {
-            return Err(BakeError::TooManyTexels { texels, limit: MAX_TEXELS });
-        }
-        layout.maps.push(MapLayout { meshes, moved, width, height, first: layout.texels });
-        layout.texels = texels as usize;
+        // Maps coordinates from the charts' rectangle to the whole map.
+        let shrink =
+            Vec2::new(unwrapped.width as f32 / width as f32, unwrapped.height as f32 / height as f32);
+        Ok(ObjectLayout { meshes: split(&object, &unwrapped, shrink), moved, width, height })
     }
-    Ok(layout)
+}
+
+/// The side of a map whose size the options give as `side`, for the object's lightmap scale.
+fn scaled_side(object: &SceneObject, side: u32) -> u32 {
+    limited_side((f64::from(side) * object.lightmap_scale).round())
+}
+
+/// A side of a map within the limits, in texels.
+fn limited_side(side: f64) -> u32 {
+    side.clamp(4.0, f64::from(LARGEST_SIDE)) as u32
+}
+
+/// The charts of an object, which are packed at one density after the other.
+struct ChartedObject<'a> {
+    name: &'a str,
+    charted: Charted<'a>,
+    gap: u32,
+}
+
+impl ChartedObject<'_> {
+    /// An unwrap at a density, in texels per canonical unit; `None` if it is larger than a map of this side.
+    fn unwrap(&self, density: f64, side: u32) -> Result<Option<Unwrapped>, BakeError> {
+        match self.charted.unwrap(density, self.gap, side) {
+            Ok(unwrapped) => Ok(Some(unwrapped)),
+            Err(UnwrapError::TooLarge { .. }) => Ok(None),
+            Err(source) => Err(BakeError::Unwrap { object: self.name.to_owned(), source }),
+        }
+    }
+
+    fn too_many_charts(&self) -> BakeError {
+        BakeError::TooManyCharts {
+            object: self.name.to_owned(),
+            charts: self.charted.len(),
+            limit: LARGEST_SIDE,
+        }
+    }
+
+    /// The unwrap at the first density, from the given one down by factors of 0.7, that fits a map of this side; that
+    /// density, and the last one that did not fit.
+    fn first_fit(&self, from: f64, side: u32) -> Result<(Option<Unwrapped>, [f64; 2]), BakeError> {
+        let [mut low, mut high] = [from; 2];
+        for _ in 0..MAX_DENSITIES {
+            if let Some(unwrapped) = self.unwrap(low, side)? {
+                return Ok((Some(unwrapped), [low, high]));
+            }
+            (high, low) = (low, 0.7 * low);
+        }
+        Ok((None, [low, high]))
+    }
+
+    /// About the densest unwrap that fits a square map, with the map's side. The side is `requested`, doubled until the
+    /// charts, of this total area, fit at all.
+    fn into_square(&self, area: f64, requested: u32) -> Result<(Unwrapped, u32), BakeError> {
+        let mut side = requested;
+        let sparsest = loop {
+            match self.unwrap(SPARSEST, side)? {
+                Some(unwrapped) => break unwrapped,
+                None if side < LARGEST_SIDE => side = (2 * side).min(LARGEST_SIDE),
+                None => return Err(self.too_many_charts()),
+            }
+        };
+        // Decrease the density from an upper bound (charts that fill the whole map) until an unwrap fits, then bisect.
+        let filling = if area > 0.0 { f64::from(side) / area.sqrt() } else { 1.0 };
+        let (fitting, [mut low, mut high]) = self.first_fit(filling, side)?;
+        let mut best = fitting.unwrap_or(sparsest);
+        for _ in 0..6 {
+            let middle = 0.5 * (low + high);
+            match self.unwrap(middle, side)? {
+                Some(unwrapped) => (best, low) = (unwrapped, middle),
+                None => high = middle,
+            }
+        }
+        Ok((best, side))
+    }
+
+    /// An unwrap at `density` or at the next lower one at which its map does not exceed [`LARGEST_SIDE`], and that
+    /// density.
+    fn at_most(&self, density: f64) -> Result<(Unwrapped, f64), BakeError> {
+        let (unwrapped, [found, _]) = self.first_fit(density, LARGEST_SIDE)?;
+        Ok((unwrapped.ok_or_else(|| self.too_many_charts())?, found))
+    }
 }
 
 /// A key that is equal for objects with the same meshes whose transforms differ only by a rotation and translation:
@@ -207,194 +384,6 @@ struct ObjectLayout {
     moved: Vec<bool>,
     width: u32,
     height: u32,
-}
-
-fn lay_out_object(
-    object: &SceneObject,
-    space: Canonical,
-    density: f64,
-    options: &BakeOptions,
-    stop: &CancelToken,
-    warnings: &mut Vec<String>,
-) -> Result<ObjectLayout, BakeError> {
-    let geometry = ObjectGeometry::new(object, space);
-    let density = density * object.lightmap_scale;
-    if let Some(layout) = with_given_uv1(object, &geometry, density, options, warnings) {
-        return Ok(layout);
-    }
-    unwrapped_anew(object, &geometry, density, options, stop, warnings)
-}
-
-/// The side of a map whose size the options give as `side`, for the object's lightmap scale.
-fn scaled_side(object: &SceneObject, side: u32) -> u32 {
-    (f64::from(side) * object.lightmap_scale).round().clamp(4.0, f64::from(LARGEST_SIDE)) as u32
-}
-
-/// The object's layout by the `uv1` that its meshes have, if that can hold a lightmap; warns if it has `uv1` that
-/// cannot.
-fn with_given_uv1(
-    object: &SceneObject,
-    geometry: &ObjectGeometry,
-    density: f64,
-    options: &BakeOptions,
-    warnings: &mut Vec<String>,
-) -> Option<ObjectLayout> {
-    if let Some(uv_area) = geometry.uv_area.filter(|&area| area > 0.0) {
-        let side = match options.density {
-            Density::MapSize(side) => scaled_side(object, side),
-            _ => {
-                ((geometry.area / uv_area).sqrt() * density).ceil().clamp(4.0, f64::from(LARGEST_SIDE)) as u32
-            }
-        };
-        match validate_uv1(&geometry.mesh, side, side) {
-            Ok(report) if report.is_sound() => {
-                let meshes =
-                    object.primitives.iter().map(|primitive| Arc::clone(&primitive.mesh)).collect();
-                let moved = vec![false; object.primitives.len()];
-                return Some(ObjectLayout { meshes, moved, width: side, height: side });
-            }
-            Ok(report) => warnings.push(format!(
-                "{}: its TEXCOORD_1 cannot hold a lightmap at {side} x {side} texels ({} triangles out of range, {} \
-                 without area, {} overlapping pairs); it was unwrapped anew",
-                object.name,
-                report.out_of_range.len(),
-                report.without_coverage.len(),
-                report.overlapping.len()
-            )),
-            Err(error) => warnings.push(format!("{}: {error}; it was unwrapped anew", object.name)),
-        }
-    }
-    if geometry.uv_area == Some(0.0) && geometry.area > 0.0 {
-        warnings.push(format!(
-            "{}: its TEXCOORD_1 covers no area, or is not finite; it was unwrapped anew",
-            object.name
-        ));
-    }
-    None
-}
-
-/// The object's layout by a new unwrap.
-fn unwrapped_anew(
-    object: &SceneObject,
-    geometry: &ObjectGeometry,
-    density: f64,
-    options: &BakeOptions,
-    stop: &CancelToken,
-    warnings: &mut Vec<String>,
-) -> Result<ObjectLayout, BakeError> {
-    let (object, moved) = free_second(object)?;
-    if moved.contains(&true) {
-        warnings.push(format!(
-            "{}: its textures' coordinates were moved from TEXCOORD_1, where the lightmap needs its own, to TEXCOORD_0, which \
-             nothing else read",
-            object.name
-        ));
-    }
-    let may_continue = || !stop.is_cancelled();
-    let chart_angle = UnwrapOptions::default().chart_angle;
-    let charted = Charted::new(&geometry.mesh, &geometry.mesh.positions, chart_angle, &may_continue)
-        .map_err(|source| BakeError::Unwrap { object: object.name.clone(), source })?;
-    let (unwrapped, width, height) = match options.density {
-        Density::MapSize(side) => {
-            let requested = scaled_side(&object, side);
-            let (unwrapped, side) = unwrap_into_square(&object, geometry, &charted, requested, options.gap)?;
-            if side > requested {
-                warnings.push(format!(
-                    "{}: its {} charts do not fit a map of {requested} x {requested} texels; it got one of {side} x {side}",
-                    object.name,
-                    charted.len()
-                ));
-            }
-            (unwrapped, side, side)
-        }
-        _ => {
-            let unwrapped = unwrap_at_most(&object, &charted, density, options.gap, warnings)?;
-            let (width, height) = (unwrapped.width.max(1), unwrapped.height.max(1));
-            (unwrapped, width, height)
-        }
-    };
-    // Maps coordinates from the charts' rectangle to the whole map.
-    let shrink = Vec2::new(unwrapped.width as f32 / width as f32, unwrapped.height as f32 / height as f32);
-    Ok(ObjectLayout { meshes: split(&object, &unwrapped, shrink), moved, width, height })
-}
-
-/// About the densest unwrap that fits a square map, with the map's side. The side is `requested`, doubled until the
-/// charts fit at all.
-fn unwrap_into_square(
-    object: &SceneObject,
-    geometry: &ObjectGeometry,
-    charted: &Charted<'_>,
-    requested: u32,
-    gap: u32,
-) -> Result<(Unwrapped, u32), BakeError> {
-    let failed = |source| BakeError::Unwrap { object: object.name.clone(), source };
-    let mut side = requested;
-    let mut best = loop {
-        match charted.unwrap(SPARSEST, gap, side) {
-            Ok(unwrapped) => break unwrapped,
-            Err(UnwrapError::TooLarge { .. }) if side < LARGEST_SIDE => side = (2 * side).min(LARGEST_SIDE),
-            Err(UnwrapError::TooLarge { .. }) => {
-                return Err(BakeError::TooManyCharts {
-                    object: object.name.clone(),
-                    charts: charted.len(),
-                    limit: LARGEST_SIDE,
-                });
-            }
-            Err(source) => return Err(failed(source)),
-        }
-    };
-    // Decrease the density from an upper bound (charts that fill the whole map) until an unwrap fits, then bisect.
-    let mut high = if geometry.area > 0.0 { f64::from(side) / geometry.area.sqrt() } else { 1.0 };
-    let mut low = high;
-    for _ in 0..MAX_DENSITIES {
-        match charted.unwrap(low, gap, side) {
-            Ok(unwrapped) => {
-                best = unwrapped;
-                break;
-            }
-            Err(UnwrapError::TooLarge { .. }) => (high, low) = (low, 0.7 * low),
-            Err(source) => return Err(failed(source)),
-        }
-    }
-    for _ in 0..6 {
-        let middle = 0.5 * (low + high);
-        match charted.unwrap(middle, gap, side) {
-            Ok(unwrapped) => (best, low) = (unwrapped, middle),
-            Err(UnwrapError::TooLarge { .. }) => high = middle,
-            Err(source) => return Err(failed(source)),
-        }
-    }
-    Ok((best, side))
-}
-
-/// An unwrap at `density`, or, with a warning, at the next lower density at which its map does not exceed
-/// [`LARGEST_SIDE`].
-fn unwrap_at_most(
-    object: &SceneObject,
-    charted: &Charted<'_>,
-    density: f64,
-    gap: u32,
-    warnings: &mut Vec<String>,
-) -> Result<Unwrapped, BakeError> {
-    let mut tried = density;
-    for _ in 0..MAX_DENSITIES {
-        match charted.unwrap(tried, gap, LARGEST_SIDE) {
-            Ok(unwrapped) => {
-                if tried < density {
-                    let share = 100.0 * tried / density;
-                    warnings.push(format!(
-                        "{}: its lightmap would exceed {LARGEST_SIDE} texels a side; it got {share:.0} % of the density",
-                        object.name
-                    ));
-                }
-                return Ok(unwrapped);
-            }
-            Err(UnwrapError::TooLarge { .. }) => tried *= 0.7,
-            Err(source) => return Err(BakeError::Unwrap { object: object.name.clone(), source }),
-        }
-    }
-    let (object, charts) = (object.name.clone(), charted.len());
-    Err(BakeError::TooManyCharts { object, charts, limit: LARGEST_SIDE })
 }
 
 /// Density so low that every chart has the fewest possible texels, in texels per canonical unit.

@@ -21,7 +21,7 @@ mod texture_coordinates;
 mod triangles;
 
 pub(crate) use from_world::{Entities, from_world};
-pub(crate) use lightmap_layout::{LightmapLayout, MapLayout, density_of, lay_out, world_points};
+pub(crate) use lightmap_layout::{Layouter, LightmapLayout, MapLayout, density_of, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;
 pub(crate) use receiver::Receiver;
