@@ -4,7 +4,7 @@
 use lumbre_scene::{IrradianceVolume, Transform};
 
 use crate::BakeReport;
-use crate::finish::baked_maps::{BakedMap, BakedObject};
+use crate::finish::{BakedMap, BakedObject};
 
 /// What a bake has made of a [`StaticScene`](crate::StaticScene).
 #[derive(Debug)]

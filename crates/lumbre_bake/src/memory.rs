@@ -4,20 +4,16 @@
 
 use std::mem::size_of;
 
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Footprint, FootprintPoint, Texel};
-use crate::denoise::nearness::Nearness;
-use crate::denoise::replicates::Estimates;
+use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel};
 use crate::denoise::texel_rows::BESIDE_A_ROW;
+use crate::denoise::{Estimates, Nearness};
 use crate::error::mebibytes;
-use crate::final_gather::gather_sums::GatherSums;
-use crate::final_gather::texel_radiance::TexelRadiance;
-use crate::radiosity::exchange::Resolution;
-use crate::radiosity::patches::{Patch, Patches};
+use crate::final_gather::{GatherSums, TexelRadiance};
+use crate::radiosity::{Patch, Patches, Resolution};
 use crate::rebake::TexelSamples;
 use crate::report::StageNotes;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
-use crate::sources::direct::Direct;
+use crate::sources::Direct;
 use crate::{BakeError, BakeOptions};
 
 /// Per triangle of the scene: the triangle itself; while the hierarchy is built, its corners without and with an index,

@@ -3,7 +3,7 @@
 //! time are in `stage`; how a list is divided into chunks is in `chunks`.
 
 use std::ops::ControlFlow;
-use std::sync::{Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::cancel_token::CancelToken;
@@ -221,43 +221,19 @@ impl<'a> BakeMonitor<'a> {
         stage_fraction: f32,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, BakeError> {
-        let (sender, receiver) = std::sync::mpsc::sync_channel(1);
-        // Shared with the thread instead of moved into it, so that the work can still be run here if the thread cannot
-        // be started.
-        let work = std::sync::Arc::new(Mutex::new(Some(work)));
-        let work_of_thread = std::sync::Arc::clone(&work);
-        let take = |from: &Mutex<Option<_>>| from.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let thread = std::thread::Builder::new().name("bake detached".into()).spawn(move || {
-            if let Some(work) = take(&work_of_thread) {
-                // After a cancellation nobody receives the result.
-                let _ = sender.send(work());
-            }
+        let done = Arc::new(DoneSignal::default());
+        let done_in_thread = Arc::clone(&done);
+        let spawned = std::thread::Builder::new().name("bake detached".into()).spawn(move || {
+            let _signal = SignalOnDrop(&done_in_thread);
+            work()
         });
-        let Ok(thread) = thread else {
-            return match take(&work) {
-                Some(work) => self.run_interruptible(stage_fraction, work),
-                None => self.cancelled(),
-            };
-        };
-        loop {
-            match receiver.recv_timeout(CALLBACK_INTERVAL) {
-                Ok(result) => {
-                    self.check_cancelled()?;
-                    return Ok(result);
-                }
-                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => self.advance(stage_fraction)?,
-                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => match thread.join() {
-                    Err(panic) => std::panic::resume_unwind(panic),
-                    // Unreachable: a thread that does not panic sends its result before it ends.
-                    Ok(()) => return self.cancelled(),
-                },
-            }
+        let thread = spawned.map_err(|error| BakeError::Threads { reason: error.to_string() })?;
+        while !done.wait(CALLBACK_INTERVAL) {
+            self.advance(stage_fraction)?;
         }
-    }
-
-    fn cancelled<T>(&mut self) -> Result<T, BakeError> {
-        self.checkpoint.flush();
-        Err(BakeError::Cancelled { stage: self.running().profile().name })
+        let result = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        self.check_cancelled()?;
+        Ok(result)
     }
 
     fn progress(&self, stage_fraction: f32) -> Progress {
@@ -274,7 +250,11 @@ impl<'a> BakeMonitor<'a> {
     }
 
     fn check_cancelled(&mut self) -> Result<(), BakeError> {
-        if self.stop.is_cancelled() { self.cancelled() } else { Ok(()) }
+        if self.stop.is_cancelled() {
+            self.checkpoint.flush();
+            return Err(BakeError::Cancelled { stage: self.running().profile().name });
+        }
+        Ok(())
     }
 
     /// The running stage; before any has begun, the first one.

@@ -7,8 +7,9 @@ use std::sync::Arc;
 use crate::monitor::BakeMonitor;
 use crate::report::StageNotes;
 use crate::scene::{BakeScene, Canonical, Layouter, LightmapLayout, StaticScene};
-use crate::sources::emitters::{Emitter, coarse_textures, emitters};
-use crate::sources::light_sources::{Sources, shines_inside_only};
+use crate::sources::emitters::{coarse_textures, emitters};
+use crate::sources::light_sources::shines_inside_only;
+use crate::sources::{Emitter, Sources};
 use crate::{BakeError, BakeOptions};
 
 /// Lays out the lightmap of every object, with `density` texels per canonical unit.

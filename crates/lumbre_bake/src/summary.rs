@@ -3,16 +3,12 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::Texel;
-use crate::final_gather::error_ledger::ErrorLedger;
-use crate::final_gather::lit_texels::LitTexels;
-use crate::final_gather::map_error::MapError;
-use crate::final_gather::rounds::GatherReport;
+use crate::coverage::{CoveredTexels, Texel};
+use crate::final_gather::{ErrorLedger, GatherReport, LitTexels, MapError};
 use crate::finish::worst_places::worst_places;
 use crate::monitor::BakeMonitor;
 use crate::probes::PlacedVolume;
-use crate::radiosity::exchange::{ExchangeReport, Resolution};
+use crate::radiosity::{ExchangeReport, Resolution};
 use crate::scene::SceneObject;
 use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime, ProbeReport};
 

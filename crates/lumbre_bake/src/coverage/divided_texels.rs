@@ -10,8 +10,9 @@ use super::contact_lines::ContactLines;
 use super::footprint::{Footprint, Texel};
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::texel_index::{CoveredTexel, MapTexel};
+use crate::visibility::PlaneFrame;
 use crate::visibility::clipping::clip_segment;
-use crate::visibility::contacts::{PlaneFrame, contacts};
+use crate::visibility::contacts::contacts;
 
 /// Length, in texels, below which a contact line does not divide a texel.
 const MIN_LENGTH: f64 = 0.25;

@@ -4,9 +4,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::scene::Receiver;
-use crate::scene::material::Side;
-use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
+use crate::scene::{BakeScene, LightmapLayout, Receiver, SceneTriangle, Side};
 use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::visibility::clipping::clip;
 

@@ -6,7 +6,8 @@ use glam::{DVec3, Vec3};
 use super::footprint::{Footprint, Texel};
 use crate::bounds::Bounds;
 use crate::scene::BakeScene;
-use crate::visibility::shaft::{Area, contact};
+use crate::visibility::Area;
+use crate::visibility::shaft::contact;
 
 /// Appends points whose convex hull contains everything that a texel shows.
 pub(crate) fn positions_of(scene: &BakeScene, texel: &Texel, positions: &mut Vec<Vec3>) {

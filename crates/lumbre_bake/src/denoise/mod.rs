@@ -17,3 +17,8 @@ pub(crate) mod smoothing_bias;
 pub(crate) mod surface;
 pub(crate) mod texel_rows;
 pub(crate) mod weighted_fit;
+
+pub(crate) use denoised::Denoised;
+pub(crate) use nearness::Nearness;
+pub(crate) use neighbourhoods::Neighbourhoods;
+pub(crate) use replicates::{Estimates, REPLICATES};

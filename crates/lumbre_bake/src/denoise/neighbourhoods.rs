@@ -8,8 +8,7 @@ use rayon::prelude::*;
 use super::box_sums::BoxSums;
 use super::surface::{NONE, Surface};
 use super::texel_rows::{ChannelRows, TexelRows};
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{MapAxes, Texel};
+use crate::coverage::{CoveredTexels, MapAxes, Texel};
 use crate::texel_index::MapTexel;
 
 /// The neighbourhoods of all covered texels.

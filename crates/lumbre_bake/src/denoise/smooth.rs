@@ -22,7 +22,7 @@ use super::replicates::Estimates;
 use super::smoothing_bias::{Products, squared_bias};
 use super::texel_rows::{ChannelRows, TexelRows};
 use super::weighted_fit::Fit;
-use crate::coverage::footprint::MapAxes;
+use crate::coverage::MapAxes;
 
 /// The first pass reaches a few texels, almost whatever is near. Its `bias_noise`: a replicate has four times the
 /// variance of the texel's mean, a block of 3 x 3 a ninth of that, and the radius of the bias holds 49 / 9 blocks,

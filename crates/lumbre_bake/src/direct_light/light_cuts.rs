@@ -5,12 +5,9 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::receiver;
-use crate::coverage::texel_groups::TexelGroups;
+use crate::coverage::{CoveredTexels, TexelGroups, receiver};
 use crate::scene::Receiver;
-use crate::sources::light_cut::LightCut;
-use crate::sources::light_sources::Sources;
+use crate::sources::{LightCut, Sources};
 use crate::texel_index::CoveredTexel;
 
 /// Texels along a block's side.

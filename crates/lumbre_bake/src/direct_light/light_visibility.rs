@@ -5,10 +5,9 @@ use glam::DVec3;
 use lumbre_optics::{LightKind, SpotCone};
 
 use crate::scene::{BakeScene, PlacedLight};
-use crate::sources::light_sources::Sources;
-use crate::visibility::cut_out::{Pieces, Shadow};
-use crate::visibility::shadow_clipping::{LightVisibility, Origin};
-use crate::visibility::shaft::{Area, Shaft, WIDEST};
+use crate::sources::Sources;
+use crate::visibility::shaft::WIDEST;
+use crate::visibility::{Area, LightVisibility, Origin, Pieces, Shadow, Shaft};
 
 /// What is known about the visibility of some lights, in ascending order of their indices, from a flat area.
 /// `texel_side` is the side length of its texels. Lights that are left out need shadow rays.

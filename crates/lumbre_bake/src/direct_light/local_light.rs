@@ -11,15 +11,11 @@ use rayon::prelude::*;
 use crate::BakeError;
 use crate::chunks::{decide, in_chunks_uncheckpointed};
 use crate::color::channel_mean;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::receiver;
-use crate::coverage::texel_groups::TexelGroups;
+use crate::coverage::{CoveredTexels, TexelGroups, receiver};
 use crate::monitor::BakeMonitor;
 use crate::sampling::{Sequence, Stream, cosine_about};
-use crate::scene::material::Side;
-use crate::scene::{Receiver, SurfaceHit};
-use crate::sources::direct::Direct;
-use crate::sources::light_sources::Sources;
+use crate::scene::{Receiver, Side, SurfaceHit};
+use crate::sources::{Direct, Sources};
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 

@@ -11,27 +11,24 @@ pub(crate) mod local_light;
 pub(crate) mod shafts;
 pub(crate) mod shared_light;
 
+pub(crate) use local_light::LocalLight;
+
 use std::collections::{BTreeSet, HashMap};
 
 use glam::Vec3;
 
 use crate::chunks::{decide, in_chunks, in_chunks_until_deadline};
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Texel, open_texels, receiver};
-use crate::denoise::neighbourhoods::Neighbourhoods;
+use crate::coverage::{CoveredTexels, Texel, receiver};
+use crate::denoise::Neighbourhoods;
 use crate::direct_light::light_cuts::LightCuts;
-use crate::direct_light::local_light::LocalLight;
 use crate::direct_light::shafts::Shafts;
 use crate::direct_light::shared_light::SharedLight;
 use crate::monitor::BakeMonitor;
 use crate::report::StageNotes;
 use crate::sample_allocation::{SampleAllocation, allocate};
 use crate::sampling::{Sequence, Stream};
-use crate::scene::LightmapLayout;
-use crate::sources::direct::{Direct, VisibilitySummary};
-use crate::sources::light_sources::Sources;
-use crate::sources::sampled_receiver::SampledReceiver;
-use crate::texel_index::CoveredTexel;
+use crate::sources::{Direct, SampledReceiver, Sources, VisibilitySummary};
+use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::{BakeError, BakeOptions};
 
 /// How far around a texel that saw a penumbra others may be in it too, in texels.
@@ -66,14 +63,14 @@ pub(crate) fn direct_light(
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(DirectLight, StageNotes), BakeError> {
     let mut sampler = SourceSampler::new(sources, texels, known, options, monitor)?;
-    let mut direct = sampler.first_pass(monitor)?;
-    sampler.share_penumbrae(&mut direct, monitor)?;
+    let mut light = sampler.first_pass(monitor)?;
+    sampler.share_penumbrae(&mut light.direct, monitor)?;
     let mut shared = sampler.shared_light(monitor)?;
-    let so_far = shared.as_ref().map(|shared| shared.with(&direct));
+    let so_far = shared.as_ref().map(|shared| shared.with(&light.direct));
     monitor.pass(PASS_OF_LOCAL_LIGHT);
-    let so_far = so_far.as_deref().unwrap_or(&direct);
+    let so_far = so_far.as_deref().unwrap_or(&light.direct);
     let local = LocalLight::new(sources, texels, &sampler.cuts.blocks, so_far, monitor)?;
-    let mut doubtful = sampler.doubtful_texels(&direct);
+    light.doubtful = sampler.doubtful_texels(&light.direct);
     let mut seconds_of_last_goal = 0.0;
     for (step, error) in error_goals(options).into_iter().enumerate() {
         if step > 0 && is_late_for_finer_goal(seconds_of_last_goal, monitor)? {
@@ -82,29 +79,43 @@ pub(crate) fn direct_light(
         }
         let options = BakeOptions { error, ..*options };
         let goals = ErrorGoals::new(sources, texels, &options, shared.is_some());
-        sampler.resample(&mut doubtful, &mut direct, options.effort().direct, monitor)?;
+        let [_, many, most] = options.effort().direct;
+        sampler.sample(&light.with_fewer_samples(many), &mut light, monitor)?;
         let begun = monitor.seconds();
-        sampler.refine(
-            &mut doubtful,
-            &mut direct,
-            &local,
-            (options.effort().direct, goals.individual),
-            monitor,
-        )?;
+        sampler.refine(&mut light, &local, most, goals.individual, monitor)?;
         if let Some(shared) = &mut shared {
-            let left = sum(&relative_variances(&direct, &local));
+            let left = sum(&relative_variances(&light.direct, &local));
             let goal = |share: f64| goals.of_shared(share, left);
             let share = |samples: f64| goals.share_for(samples);
             shared.refine(&local, (share(0.0), &share), &goal, monitor)?;
         }
         seconds_of_last_goal = monitor.seconds() - begun;
     }
+    let mut direct = light.direct;
     if let Some(shared) = shared {
         shared.add_to(&mut direct);
     }
     let rays = sampler.unknown().map(|texel| u64::from(direct[texel.place()].rays));
     let notes = StageNotes::of_rays(rays.sum());
     Ok((DirectLight { texels: direct, local }, notes))
+}
+
+/// The direct light of the individually sampled sources, as far as it has been sampled.
+struct IndividualLight {
+    /// Per covered texel.
+    direct: Vec<Direct>,
+    /// Samples that have been taken, per covered texel.
+    samples: Vec<u32>,
+    /// The texels that may need more samples than the first pass takes.
+    doubtful: Vec<CoveredTexel>,
+}
+
+impl IndividualLight {
+    /// Allocates `many` samples to each doubtful texel that has had fewer.
+    fn with_fewer_samples(&self, many: u32) -> Vec<SampleAllocation> {
+        let fewer = self.doubtful.iter().filter(|texel| self.samples[texel.place()] < many);
+        fewer.map(|&texel| SampleAllocation { texel, samples: many }).collect()
+    }
 }
 
 /// Samples the direct light of the texels that are not known from a previous bake, with everything that all passes
@@ -177,19 +188,20 @@ impl<'a> SourceSampler<'a> {
     }
 
     /// Known light, and a few samples of every other texel: a complete map, whatever time it takes.
-    fn first_pass(&self, monitor: &mut BakeMonitor<'_>) -> Result<Vec<Direct>, BakeError> {
+    fn first_pass(&self, monitor: &mut BakeMonitor<'_>) -> Result<IndividualLight, BakeError> {
         let unknown: Vec<CoveredTexel> = self.unknown().collect();
-        let [few, ..] = self.options.effort().direct;
+        let [usual, ..] = self.options.effort().direct;
         let is_time_short = decide(monitor, monitor.clock().is_past(SHORT_OF_TIME))?;
-        let few = if is_time_short { few.min(LATE_SAMPLES) } else { few };
+        let few = if is_time_short { usual.min(LATE_SAMPLES) } else { usual };
         let sampled = self.few_samples(&unknown, few, monitor)?;
-        let mut direct: Vec<Direct> = CoveredTexel::all(self.texels.list.len())
+        let count = self.texels.list.len();
+        let mut direct: Vec<Direct> = CoveredTexel::all(count)
             .map(|texel| known_light(self.known, texel).unwrap_or_default())
             .collect();
         for (texel, light) in unknown.iter().zip(sampled) {
             direct[texel.place()] = light;
         }
-        Ok(direct)
+        Ok(IndividualLight { direct, samples: vec![usual; count], doubtful: Vec::new() })
     }
 
     /// Makes lamps share samples in blocks that lie in their penumbrae for the most part: behind a grille, or among
@@ -249,47 +261,30 @@ impl<'a> SourceSampler<'a> {
     }
 
     /// The texels in or near penumbras, as far as the first pass has found them.
-    fn doubtful_texels(&self, direct: &[Direct]) -> DoubtfulTexels {
-        let mut texels = doubtful_texels(self.texels.layout, &self.texels.list, direct);
+    fn doubtful_texels(&self, direct: &[Direct]) -> Vec<CoveredTexel> {
+        let mut texels = doubtful_texels(self.texels, direct);
         texels.retain(|&texel| self.is_wanted(texel) && direct[texel.place()].sampled);
-        let [few, ..] = self.options.effort().direct;
-        DoubtfulTexels { texels, samples: vec![few; self.texels.list.len()] }
+        texels
     }
 
-    /// Takes `many` samples of each doubtful texel that has had fewer, as far as there is time.
-    fn resample(
-        &self,
-        doubtful: &mut DoubtfulTexels,
-        direct: &mut [Direct],
-        [_, many, _]: [u32; 3],
-        monitor: &mut BakeMonitor<'_>,
-    ) -> Result<(), BakeError> {
-        let has_fewer = |texel: &CoveredTexel| doubtful.samples[texel.place()] < many;
-        let texels = doubtful.texels.iter().copied().filter(has_fewer);
-        let wanted: Vec<SampleAllocation> =
-            texels.map(|texel| SampleAllocation { texel, samples: many }).collect();
-        self.sample(&wanted, doubtful, direct, monitor)?;
-        Ok(())
-    }
-
-    /// Takes more samples of doubtful texels, mostly at the edges of shadows, until the sum of squared errors is down
-    /// to `goal`, no texel can have more, or the time is up.
+    /// Takes more samples of doubtful texels, up to `most`, mostly at the edges of shadows, until the sum of squared
+    /// errors is down to `goal`, no texel can have more, or the time is up.
     fn refine(
         &self,
-        doubtful: &mut DoubtfulTexels,
-        direct: &mut [Direct],
+        light: &mut IndividualLight,
         local: &LocalLight,
-        ([_, _, most], goal): ([u32; 3], f64),
+        most: u32,
+        goal: f64,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
         loop {
-            let variances = relative_variances(direct, local);
+            let variances = relative_variances(&light.direct, local);
             if sum(&variances) <= goal {
                 return Ok(());
             }
-            let texels = doubtful.texels.iter().copied();
-            let allocated = allocate(texels, &variances, &doubtful.samples, most, ORDER, goal);
-            if self.sample(&allocated, doubtful, direct, monitor)? == 0 {
+            let texels = light.doubtful.iter().copied();
+            let allocated = allocate(texels, &variances, &light.samples, most, ORDER, goal);
+            if self.sample(&allocated, light, monitor)? == 0 {
                 return Ok(());
             }
         }
@@ -300,31 +295,23 @@ impl<'a> SourceSampler<'a> {
     fn sample(
         &self,
         wanted: &[SampleAllocation],
-        doubtful: &mut DoubtfulTexels,
-        direct: &mut [Direct],
+        light: &mut IndividualLight,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<usize, BakeError> {
         if wanted.is_empty() {
             return Ok(0);
         }
         monitor.pass(PASS);
-        let lights = in_chunks_until_deadline(wanted.len(), monitor, |index| {
+        let sampled = in_chunks_until_deadline(wanted.len(), monitor, |index| {
             self.light(wanted[index].texel, wanted[index].samples)
         })?;
-        for (SampleAllocation { texel, samples }, &light) in wanted.iter().zip(&lights) {
-            let rays = direct[texel.place()].rays + light.rays;
-            direct[texel.place()] = Direct { rays, ..light };
-            doubtful.samples[texel.place()] = *samples;
+        for (SampleAllocation { texel, samples }, &sampled) in wanted.iter().zip(&sampled) {
+            let rays = light.direct[texel.place()].rays + sampled.rays;
+            light.direct[texel.place()] = Direct { rays, ..sampled };
+            light.samples[texel.place()] = *samples;
         }
-        Ok(lights.len())
+        Ok(sampled.len())
     }
-}
-
-/// The texels that may need more samples than the first pass takes.
-struct DoubtfulTexels {
-    texels: Vec<CoveredTexel>,
-    /// Samples that have been taken, for every covered texel.
-    samples: Vec<u32>,
 }
 
 /// The errors to aim at, one after the other. With a time limit they begin with a coarse one and go down by steps of
@@ -449,19 +436,15 @@ fn sum(numbers: &[f32]) -> f64 {
 
 /// Texels that have, within [`REACH`], a texel (perhaps themselves) that saw a source partly, or one that saw other
 /// sources than they did.
-fn doubtful_texels(layout: &LightmapLayout, texels: &[Texel], direct: &[Direct]) -> Vec<CoveredTexel> {
-    let mut summaries: Vec<Option<VisibilitySummary>> = vec![None; layout.texels];
-    for (covered, texel) in open_texels(texels) {
-        summaries[texel.index.place()] = Some(direct[covered.place()].seen);
-    }
-    let is_doubtful = |texel: &Texel| {
-        let Some(summary) = summaries[texel.index.place()] else { return false };
-        let map = &layout.maps[texel.object as usize];
-        map.neighbourhood(texel.x, texel.y, REACH).any(|near| {
-            summaries[near.place()].is_some_and(|other| other.partly || other.signature != summary.signature)
-        })
+fn doubtful_texels(texels: &CoveredTexels<'_>, direct: &[Direct]) -> Vec<CoveredTexel> {
+    let seen_at = |place: MapTexel| texels.open_at(place).map(|texel| direct[texel.place()].seen);
+    let is_doubtful = |(covered, texel): &(CoveredTexel, &Texel)| {
+        let summary = direct[covered.place()].seen;
+        let map = &texels.layout.maps[texel.object as usize];
+        let differs = |other: VisibilitySummary| other.partly || other.signature != summary.signature;
+        map.neighbourhood(texel.x, texel.y, REACH).any(|near| seen_at(near).is_some_and(differs))
     };
-    CoveredTexel::all(texels.len()).filter(|covered| is_doubtful(&texels[covered.place()])).collect()
+    texels.open().filter(is_doubtful).map(|(covered, _)| covered).collect()
 }
 
 #[cfg(test)]

@@ -58,14 +58,13 @@ use crate::squared_errors::SquaredErrors;
 use rayon::prelude::*;
 
 use super::error_estimate::PatchBias;
+use super::gather_sums::GatherSums;
 use crate::ErrorPart;
-use crate::coverage::footprint::Texel;
-use crate::denoise::denoised::Denoised;
+use crate::coverage::Texel;
+use crate::denoise::Denoised;
 use crate::denoise::replicates::mean;
-use crate::direct_light::DirectLight;
-use crate::direct_light::local_light::LocalLight;
-use crate::final_gather::gather_sums::GatherSums;
-use crate::sources::direct::Direct;
+use crate::direct_light::{DirectLight, LocalLight};
+use crate::sources::Direct;
 
 /// The gather's results and errors, per covered texel.
 pub(crate) struct GatherErrors<'a> {

@@ -10,7 +10,7 @@ use super::gather_sums::{GatherSums, UnguidedLight};
 use super::patch_fallback::{from_patches, knows_nothing};
 use super::radiance_cache::RadianceCache;
 use crate::chunks::decide;
-use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::CoveredTexels;
 use crate::denoise::replicates::{mean, variance};
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::SampleAllocation;
@@ -147,7 +147,7 @@ fn copy_representatives(representatives: &[CoveredTexel], gathered: &mut [Gather
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::denoise::replicates::REPLICATES;
+    use crate::denoise::REPLICATES;
 
     /// Of a texel whose four replicates have one sample each of this light.
     fn sums(light: f32) -> GatherSums {

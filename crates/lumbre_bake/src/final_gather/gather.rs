@@ -4,10 +4,9 @@
 //! so near a hit, the path makes another bounce instead. Emission is not read: `direct_light` has already counted it.
 //! Not where rays go and what they hit: that is `incident`.
 
+use super::gather_sums::{GatherSums, UnguidedLight};
 use crate::color::channel_mean;
-use crate::denoise::nearness::Nearness;
-use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::gather_sums::{GatherSums, UnguidedLight};
+use crate::denoise::{Nearness, REPLICATES};
 use std::cell::RefCell;
 
 use glam::{Vec2, Vec3};
@@ -16,14 +15,12 @@ use super::incident::{GatherRequest, Hit, IncidentSample, SamplePath};
 use super::radiance_cache::RadianceCache;
 use crate::BakeError;
 use crate::chunks::in_chunks_until_deadline;
-use crate::coverage::footprint::{Texel, receiver};
-use crate::coverage::tile_sequence::TileSequence;
+use crate::coverage::{Texel, TileSequence, receiver};
 use crate::monitor::BakeMonitor;
-use crate::radiosity::patch_index::PatchIndex;
+use crate::radiosity::PatchIndex;
 use crate::sample_allocation::SampleAllocation;
 use crate::sampling::{Sequence, Stream};
-use crate::scene::Receiver;
-use crate::scene::material::Side;
+use crate::scene::{Receiver, Side};
 
 /// One in this many samples also traces a real bounce, to check the patch that it reads.
 const CHECK_INTERVAL: u32 = 4;

@@ -5,9 +5,8 @@ use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::color::channel_mean;
-use crate::denoise::nearness::Nearness;
-use crate::denoise::replicates::REPLICATES;
-use crate::radiosity::patch_index::PatchIndex;
+use crate::denoise::{Nearness, REPLICATES};
+use crate::radiosity::PatchIndex;
 
 /// Sums of the weights of a replicate's samples. The expected weight is 1, so the effect of a mean weight that differs
 /// from 1 can be removed from the estimate: the weight is a control variate, with its coefficient by regression (Owen

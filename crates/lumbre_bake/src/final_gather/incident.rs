@@ -7,11 +7,9 @@ use std::f32::consts::FRAC_1_PI;
 use glam::{Vec2, Vec3};
 
 use super::radiance_cache::RadianceCache;
-use crate::radiosity::patch_index::PatchIndex;
-use crate::radiosity::sampling_guide::{GuidedPatch, Region, RowPart};
+use crate::radiosity::{GuidedPatch, PatchIndex, Region, RowPart};
 use crate::sampling::{cosine_about, triangle_point};
-use crate::scene::material::Side;
-use crate::scene::{Receiver, SurfaceHit};
+use crate::scene::{Receiver, Side, SurfaceHit};
 use crate::texel_index::MapTexel;
 
 /// A request for one sample of a receiver's light by bounces.

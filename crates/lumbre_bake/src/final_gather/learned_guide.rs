@@ -11,10 +11,9 @@ use rayon::prelude::*;
 
 use super::gather_sums::{GatherSums, UnguidedLight};
 use super::radiance_cache::RadianceCache;
-use crate::coverage::footprint::Texel;
-use crate::radiosity::patch_index::PatchIndex;
-use crate::radiosity::sampling_guide::{Discovery, Region};
-use crate::scene::material::Side;
+use crate::coverage::Texel;
+use crate::radiosity::{Discovery, PatchIndex, Region};
+use crate::scene::Side;
 
 /// A sample counts as a discovery if it brought more than this multiple of the mean sample of its texel.
 const OUTSTANDING: f64 = 8.0;
@@ -65,7 +64,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::denoise::replicates::REPLICATES;
+    use crate::denoise::REPLICATES;
 
     #[test]
     fn only_a_sample_that_outweighs_the_others_is_a_discovery() {

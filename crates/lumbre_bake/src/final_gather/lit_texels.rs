@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::rounds::IndirectLight;
-use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::CoveredTexels;
 use crate::direct_light::DirectLight;
 
 /// The covered texels and their light.

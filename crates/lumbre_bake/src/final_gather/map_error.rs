@@ -2,8 +2,8 @@
 
 use super::error_ledger::{ErrorLedger, open_sum, relative_to, root};
 use crate::ErrorPart;
-use crate::coverage::footprint::Texel;
-use crate::direct_light::local_light::LocalLight;
+use crate::coverage::Texel;
+use crate::direct_light::LocalLight;
 use crate::squared_errors::SquaredErrors;
 
 /// The expected error over all texels that are not hidden.

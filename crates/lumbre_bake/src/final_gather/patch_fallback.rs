@@ -3,12 +3,13 @@
 
 use glam::{Vec2, Vec3};
 
+use super::gather_sums::GatherSums;
+use super::radiance_cache::RadianceCache;
 use crate::color::wide_channel_mean;
-use crate::coverage::footprint::Texel;
-use crate::denoise::replicates::{REPLICATES, mean, variance};
-use crate::final_gather::gather_sums::GatherSums;
-use crate::final_gather::radiance_cache::RadianceCache;
-use crate::scene::material::Side;
+use crate::coverage::Texel;
+use crate::denoise::REPLICATES;
+use crate::denoise::replicates::{mean, variance};
+use crate::scene::Side;
 
 /// Fewer gathered texels than this say nothing about the others.
 const MIN_GATHERED: u32 = 256;

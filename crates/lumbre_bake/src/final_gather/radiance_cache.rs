@@ -7,16 +7,13 @@ use glam::{Vec2, Vec3};
 
 use super::steep_light::steep_texels;
 use super::texel_radiance::{TexelRadiances, mean_reflectances};
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::denoise::replicates::REPLICATES;
+use crate::coverage::CoveredTexels;
+use crate::denoise::REPLICATES;
 use crate::direct_light::DirectLight;
 use crate::monitor::BakeMonitor;
-use crate::radiosity::exchange::Exchange;
-use crate::radiosity::patches::Patches;
-use crate::radiosity::sampling_guide::{Discovery, SamplingGuide};
-use crate::scene::material::Side;
-use crate::scene::{BakeScene, LightmapLayout};
-use crate::sources::light_sources::Sources;
+use crate::radiosity::{Discovery, Exchange, Patches, SamplingGuide};
+use crate::scene::{BakeScene, LightmapLayout, Side};
+use crate::sources::Sources;
 use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions};
 

@@ -7,9 +7,8 @@ use glam::{Vec2, Vec3};
 use super::incident::Hit;
 use super::radiance_cache::RadianceCache;
 use crate::color::channel_mean;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{FootprintPoint, receiver};
-use crate::direct_light::local_light::LocalLight;
+use crate::coverage::{CoveredTexels, FootprintPoint, receiver};
+use crate::direct_light::LocalLight;
 use crate::sampling::Sequence;
 use crate::texel_index::MapTexel;
 

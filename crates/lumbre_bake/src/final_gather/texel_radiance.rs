@@ -3,11 +3,10 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Footprint, FootprintPoint, Texel};
-use crate::final_gather::gather_sums::GatherSums;
-use crate::radiosity::patches::Patches;
-use crate::scene::material::Side;
+use super::gather_sums::GatherSums;
+use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel};
+use crate::radiosity::Patches;
+use crate::scene::Side;
 use crate::texel_index::MapTexel;
 
 /// What rays read of every texel of all maps.

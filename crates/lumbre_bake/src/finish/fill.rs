@@ -8,9 +8,7 @@ use rayon::prelude::*;
 
 use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
-use crate::coverage::contact_lines::ContactLines;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Footprint, Texel};
+use crate::coverage::{ContactLines, CoveredTexels, Footprint, Texel};
 use crate::scene::{LightmapLayout, MapLayout};
 
 /// Added to the variance of the neighbours' positions along each axis, in square texels: where that is much smaller,

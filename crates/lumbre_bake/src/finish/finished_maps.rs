@@ -7,7 +7,7 @@ use super::pages::Pages;
 use super::resolution_error::{DensePoint, compare};
 use super::seams::{MapValues, close_seams};
 use super::separate_light::separate;
-use crate::final_gather::lit_texels::LitTexels;
+use crate::final_gather::LitTexels;
 use crate::monitor::BakeMonitor;
 use crate::report::{ResolutionReport, SeamReport, StageNotes};
 use crate::scene::SceneObject;

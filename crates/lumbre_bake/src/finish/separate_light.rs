@@ -3,9 +3,9 @@
 use glam::Vec3;
 
 use super::fill::fill;
-use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::CoveredTexels;
 use crate::direct_light::DirectLight;
-use crate::final_gather::rounds::IndirectLight;
+use crate::final_gather::IndirectLight;
 
 /// The two parts of the irradiance, per texel of all maps, W/m²; NaN where nothing is known.
 pub(crate) struct Separate {

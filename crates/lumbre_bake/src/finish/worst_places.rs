@@ -7,7 +7,7 @@ use glam::{DVec3, IVec3};
 
 use crate::WorstPlace;
 use crate::bounds::Bounds;
-use crate::coverage::footprint::{Texel, receiver};
+use crate::coverage::{Texel, receiver};
 use crate::scene::{BakeScene, SceneObject};
 
 /// Side of the cubes into which the level is divided, as a share of its longest side.

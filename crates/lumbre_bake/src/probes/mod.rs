@@ -21,11 +21,11 @@ pub(crate) use light::ProbeSample;
 
 use self::grid::Grid;
 use crate::chunks::in_chunks_uncheckpointed;
-use crate::final_gather::radiance_cache::RadianceCache;
+use crate::final_gather::RadianceCache;
 use crate::monitor::BakeMonitor;
 use crate::report::StageNotes;
 use crate::scene::{BakeScene, StaticScene};
-use crate::sources::light_sources::Sources;
+use crate::sources::Sources;
 use crate::stage::Stage;
 use crate::{BakeError, BakeOptions, ProbeReport, Quality};
 

@@ -3,10 +3,10 @@
 
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
+use super::ray_counts::{PatchRayCounts, counted};
 use crate::BakeError;
 use crate::chunks::in_chunks;
 use crate::monitor::BakeMonitor;
-use crate::radiosity::ray_counts::{PatchRayCounts, counted};
 use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
 use crate::scene::{BakeScene, SurfaceHit};
 

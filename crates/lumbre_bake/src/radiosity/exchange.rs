@@ -17,9 +17,8 @@ use crate::monitor::BakeMonitor;
 use crate::options::Solver;
 use crate::report::StageNotes;
 use crate::sampling::{Sequence, Stream, triangle_point};
-use crate::scene::material::Side;
-use crate::scene::{BakeScene, Receiver};
-use crate::sources::light_sources::Sources;
+use crate::scene::{BakeScene, Receiver, Side};
+use crate::sources::Sources;
 use crate::stage::Stage;
 use crate::{BakeError, BakeOptions};
 

@@ -13,8 +13,8 @@ use crate::monitor::BakeMonitor;
 use crate::options::Solver;
 use crate::scene::from_world;
 use crate::scene::laid_out::laid_out;
+use crate::sources::Sources;
 use crate::sources::emitters::emitters;
-use crate::sources::light_sources::Sources;
 use crate::{BakeOptions, Density, Quality};
 
 pub(crate) const MODELS: [&str; 2] = ["models/cornell_box.glb", "conformance/bake/alcove.glb"];

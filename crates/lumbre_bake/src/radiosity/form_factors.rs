@@ -3,7 +3,7 @@
 //! share of the patch's rays that hit a surface, which is an estimate of the exact sum (1 in a closed scene). Rays are
 //! counted in `cosine_rays` and `global_lines`; the linear system is solved in `solver`.
 
-use crate::radiosity::ray_counts::{Counts, PatchRayCounts, merged};
+use super::ray_counts::{Counts, PatchRayCounts, merged};
 use std::ops::Range;
 
 use rayon::prelude::*;

@@ -13,14 +13,13 @@ use serde::{Deserialize, Serialize};
 use super::cosine_rays::{self, MIN_RAYS};
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
+use super::ray_counts::{PatchRayCounts, counted};
 use crate::BakeError;
 use crate::bounds::Bounds;
 use crate::chunks::{in_chunks, in_chunks_until_deadline};
 use crate::monitor::BakeMonitor;
-use crate::radiosity::ray_counts::{PatchRayCounts, counted};
 use crate::sampling::{Sequence, Stream, cosine_direction, frame, sphere_direction};
-use crate::scene::BakeScene;
-use crate::scene::crossings::Face;
+use crate::scene::{BakeScene, Face};
 
 /// Lines that are cast together, as one value of a list that is computed in chunks.
 const BATCH: u32 = 64;

@@ -5,11 +5,9 @@
 use glam::{DVec3, Vec2, Vec3};
 
 use super::patches::Patches;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Footprint, Texel, barycentric};
+use crate::coverage::{CoveredTexels, Footprint, Texel, barycentric};
 use crate::direct_light::DirectLight;
-use crate::scene::BakeScene;
-use crate::scene::material::Side;
+use crate::scene::{BakeScene, Side};
 
 /// Fewest texels that a patch's light is computed from, in each half of them. The share of fewer texels that lies
 /// beyond the patch's border would be too large.
@@ -77,13 +75,13 @@ mod tests {
     use lumbre_optics::{BakeMode, Light};
 
     use super::*;
-    use crate::coverage::footprint::{FootprintPoint, receiver};
+    use crate::coverage::{FootprintPoint, receiver};
     use crate::direct_light::direct_light;
     use crate::monitor::BakeMonitor;
     use crate::sampling::{Sequence, Stream, triangle_point};
     use crate::scene::laid_out::laid_out;
     use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
-    use crate::sources::light_sources::Sources;
+    use crate::sources::Sources;
     use crate::{BakeOptions, Density};
 
     /// For a block in a room under a lamp, the light of patches by texels agrees with that by 1,024 rays to the lamp

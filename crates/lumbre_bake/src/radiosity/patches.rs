@@ -12,10 +12,10 @@ use rayon::prelude::*;
 use super::bsp::{BspTrees, Corners, CutCell};
 use super::patch_index::PatchIndex;
 use crate::scene::mean_of_points::mean_of_points;
-use crate::visibility::contacts::{PlaneFrame, contacts};
+use crate::visibility::PlaneFrame;
+use crate::visibility::contacts::contacts;
 
-use crate::scene::material::{ShownTexels, Side};
-use crate::scene::{BakeScene, SceneTriangle};
+use crate::scene::{BakeScene, SceneTriangle, ShownTexels, Side};
 
 /// One side of one piece of a triangle.
 #[derive(Clone, Copy, Debug)]

@@ -12,11 +12,9 @@ use super::fingerprints::{bounds, emission, fingerprint, first_triangles, layout
 use super::samples::{Content, ObjectSamples, TexelSamples};
 use crate::BakeOptions;
 use crate::content_hash::{ContentHash, Hashes};
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::Texel;
+use crate::coverage::{CoveredTexels, Texel};
 use crate::scene::{Canonical, SceneObject, density_of};
-use crate::sources::direct::Direct;
-use crate::sources::light_sources::Sources;
+use crate::sources::{Direct, Sources};
 
 /// With more changed objects than this the whole scene is baked.
 const MAX_CHANGED: usize = 64;

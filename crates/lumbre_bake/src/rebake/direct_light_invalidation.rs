@@ -10,13 +10,11 @@ use rayon::prelude::*;
 
 use super::changed_box::ChangedBox;
 use crate::bounds::Bounds;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::receiver;
 use crate::coverage::texel_geometry::positions_of;
-use crate::coverage::texel_groups::TexelGroups;
+use crate::coverage::{CoveredTexels, TexelGroups, receiver};
 use crate::scene::{Canonical, PlacedLight};
+use crate::sources::Sources;
 use crate::sources::emitters::lamps;
-use crate::sources::light_sources::Sources;
 
 /// Canonical units.
 #[derive(Clone, Copy, Debug, PartialEq)]

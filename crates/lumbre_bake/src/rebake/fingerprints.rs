@@ -4,10 +4,9 @@
 use glam::Vec3;
 
 use crate::bounds::Bounds;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Footprint, Texel};
+use crate::coverage::{CoveredTexels, Footprint, Texel};
 use crate::sampling::hash;
-use crate::sources::light_sources::Sources;
+use crate::sources::Sources;
 
 /// The bounding box of each object, canonical units; empty for an object without triangles.
 pub(crate) fn bounds(texels: &CoveredTexels<'_>) -> Vec<Bounds<Vec3>> {

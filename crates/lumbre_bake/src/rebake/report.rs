@@ -1,8 +1,8 @@
 //! The report on what was kept of a former bake. What is kept is chosen in `changes` and `choice`.
 
 use super::changes::Changes;
-use crate::coverage::footprint::Texel;
-use crate::final_gather::reused_gather::ReusedGather;
+use crate::coverage::Texel;
+use crate::final_gather::ReusedGather;
 use crate::report::{BakeReport, RebakeReport};
 
 /// The report of a bake with usable former samples. `report` must hold the mean irradiance already.

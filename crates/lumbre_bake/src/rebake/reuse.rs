@@ -5,11 +5,10 @@ use super::changes::Changes;
 use super::fingerprints::{bounds, emission, layouts};
 use super::samples::{Content, ObjectSamples, Samples, TexelSamples};
 use crate::content_hash::{ContentHash, Hashes};
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::final_gather::lit_texels::LitTexels;
-use crate::final_gather::reused_gather::ReusedGather;
+use crate::coverage::CoveredTexels;
+use crate::final_gather::{LitTexels, ReusedGather};
 use crate::scene::{Canonical, SceneObject, StaticScene, density_of};
-use crate::sources::light_sources::Sources;
+use crate::sources::Sources;
 use crate::{BakeOptions, RebakeReport};
 use glam::Vec3;
 

@@ -8,10 +8,9 @@ use super::fingerprints::{fingerprint, first_triangles};
 use crate::bounds::Bounds;
 use crate::color::channel_mean;
 use crate::content_hash::ContentHash;
-use crate::final_gather::gather_sums::{GatherSums, UnguidedLight, Weights};
-use crate::final_gather::lit_texels::LitTexels;
+use crate::final_gather::{GatherSums, LitTexels, UnguidedLight, Weights};
 use crate::scene::Canonical;
-use crate::sources::direct::Direct;
+use crate::sources::Direct;
 
 /// The samples of a finished bake, to be given to [`Bake::former`](crate::Bake::former) when the scene has changed.
 #[derive(Clone, Debug)]

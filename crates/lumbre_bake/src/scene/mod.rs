@@ -20,11 +20,13 @@ mod texture;
 mod texture_coordinates;
 mod triangles;
 
+pub(crate) use crossings::Face;
+pub(crate) use material::{ShownTexels, Side, SurfaceMaterial};
+
 pub(crate) use from_world::{Entities, from_world};
 pub(crate) use lightmap_layout::{Layouter, LightmapLayout, MapLayout, density_of, world_points};
-pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;
 pub(crate) use receiver::Receiver;
 pub use static_scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
 pub(crate) use texture_coordinates::textures_of;
-pub(crate) use triangles::{BakeScene, Canonical, SceneTriangle};
+pub(crate) use triangles::{BakeScene, Canonical, SceneTriangle, position_bits};

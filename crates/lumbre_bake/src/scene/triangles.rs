@@ -58,6 +58,11 @@ impl Canonical {
     }
 }
 
+/// The bits of a position, equal for equal positions: adding zero turns -0 into 0.
+pub(crate) fn position_bits(position: Vec3) -> [u32; 3] {
+    (position + Vec3::ZERO).to_array().map(f32::to_bits)
+}
+
 /// A triangle of the scene.
 #[derive(Clone, Debug)]
 pub(crate) struct SceneTriangle {

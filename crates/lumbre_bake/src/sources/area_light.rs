@@ -15,9 +15,8 @@ use super::sampled_receiver::{SampledReceiver, SurfacePoints};
 use super::share_variance::{share_variance, uneven_variance};
 use crate::color::channel_mean;
 use crate::scene::Receiver;
-use crate::visibility::cut_out::Pieces;
-use crate::visibility::occluders::LampOccluders;
 use crate::visibility::visible_part::visible_part;
+use crate::visibility::{LampOccluders, Pieces};
 
 /// An estimate of the visible fraction of a source's light, per channel.
 struct VisibleFraction {

@@ -6,7 +6,7 @@ use super::light_cut::LightCut;
 use super::light_sources::Sources;
 use super::sampled_receiver::{SampledReceiver, SurfacePoints};
 use crate::sampling::Sequence;
-use crate::visibility::occluders::Visibility;
+use crate::visibility::Visibility;
 
 /// Number of shared samples for each sample of an individually sampled source.
 const SHARED_SAMPLES_FACTOR: u32 = 4;

@@ -20,3 +20,9 @@ pub(crate) mod sampled_receiver;
 pub(crate) mod share_variance;
 pub(crate) mod shared_samples;
 pub(crate) mod source_tree;
+
+pub(crate) use direct::{Direct, VisibilitySummary};
+pub(crate) use emitters::Emitter;
+pub(crate) use light_cut::{LightCut, SharedSources};
+pub(crate) use light_sources::Sources;
+pub(crate) use sampled_receiver::SampledReceiver;

@@ -5,6 +5,9 @@
 use glam::{DVec3, Vec3};
 use lumbre_optics::{BakeMode, LightKind};
 
+use super::batches::{BATCHES, batch_of, variance_of_mean};
+use super::direct::Direct;
+use super::light_sources::Sources;
 use super::punctual_irradiance::{
     PunctualIrradiance, center_irradiance, over_parallelogram, punctual_irradiance,
 };
@@ -15,11 +18,8 @@ use crate::color::channel_mean;
 use crate::sampling::{cosine_direction, frame};
 use crate::scene::Receiver;
 use crate::scene::{BakeScene, PlacedLight};
-use crate::sources::batches::{BATCHES, batch_of, variance_of_mean};
-use crate::sources::direct::Direct;
-use crate::sources::light_sources::Sources;
-use crate::visibility::cut_out::{GAP, Pieces};
-use crate::visibility::shadow_clipping::{LightVisibility, ReceiverShape};
+use crate::visibility::cut_out::GAP;
+use crate::visibility::{LightVisibility, Pieces, ReceiverShape};
 
 /// Offset of the lights' ids in [`VisibilitySummary::add`](super::direct::VisibilitySummary::add); lower ids are nodes
 /// of the emitter tree.

@@ -3,7 +3,7 @@
 
 use crate::sampling::Sequence;
 use crate::scene::Receiver;
-use crate::visibility::occluders::Visibility;
+use crate::visibility::Visibility;
 
 /// Maps the unit square onto the surface of a receiver; `None` where it has none.
 pub(crate) trait SurfacePoints: Fn(f32, f32) -> Option<Receiver> {}

@@ -17,7 +17,7 @@ use super::samples::{Reading, Sample};
 use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
 use crate::conjugate_gradients::{self, System};
-use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::CoveredTexels;
 use crate::report::SeamReport;
 use crate::texel_index::MapTexel;
 

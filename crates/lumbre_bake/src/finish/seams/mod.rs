@@ -19,7 +19,7 @@ mod samples;
 
 use glam::Vec3;
 
-use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::CoveredTexels;
 use crate::monitor::BakeMonitor;
 use crate::report::{SeamReport, StageNotes};
 use crate::{BakeError, BakeOptions};

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::edge_grid::EdgeGrid;
 use super::edges::Edge;
-use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::CoveredTexels;
 use crate::texel_index::MapTexel;
 
 /// Edges nearer to each other than this are in one place, canonical units: 64 roundings of the largest coordinate,
