@@ -23,7 +23,7 @@ use crate::monitor::{BakeMonitor, Callback};
 use crate::probes;
 use crate::radiosity::patch_light::patch_light;
 use crate::radiosity::{Exchange, Patches};
-use crate::rebake::{Reuse, Samples, rebake_report, reused_gather};
+use crate::rebake::{Reuse, Samples, reused_gather};
 use crate::scene::{StaticScene, from_world};
 use crate::stage::Stage;
 use crate::summary;
@@ -276,7 +276,7 @@ fn run(
     summary::write_stages(&lit, &resolution, exchanged, volume.as_ref(), &mut report);
     summary::write_errors(&lit, gathered, &input.objects, options, monitor, &mut report)?;
     if let Some(changes) = &changes {
-        report.rebake = Some(rebake_report(changes, &texels.list, reused.as_ref(), &report));
+        report.rebake = Some(changes.report(&texels, reused.as_ref(), report.mean_of_channels()));
     }
     let samples = match request.keeps_samples && report.ended != Ended::Time {
         // Samples that were cut short would not be good enough for a later bake that has more time.

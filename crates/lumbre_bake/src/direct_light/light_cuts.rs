@@ -11,7 +11,7 @@ use crate::sources::{LightCut, Sources};
 use crate::texel_index::CoveredTexel;
 
 /// Texels along a block's side.
-const BLOCK: u32 = 16;
+const BLOCK_SIDE: u32 = 16;
 
 /// The light cuts of all blocks.
 pub(crate) struct LightCuts {
@@ -25,7 +25,7 @@ pub(crate) struct LightCuts {
 impl LightCuts {
     /// Cuts of all blocks.
     pub fn new(sources: &Sources<'_>, texels: &CoveredTexels<'_>) -> Self {
-        let blocks = TexelGroups::blocks(&texels.list, &texels.charts, BLOCK);
+        let blocks = TexelGroups::blocks(&texels.list, &texels.charts, BLOCK_SIDE);
         let texels = &texels.list;
         let anchor = |members: &Vec<CoveredTexel>| {
             let middle_of = |member: &CoveredTexel| -> Option<Receiver> {

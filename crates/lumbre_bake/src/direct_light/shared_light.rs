@@ -16,7 +16,7 @@ use crate::denoise::{Denoised, Estimates, Nearness, Neighbourhoods, REPLICATES};
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::{SampleAllocation, added, allocate_within};
 use crate::sampling::{Stream, hash};
-use crate::sources::{Direct, SharedSources, Sources};
+use crate::sources::{Direct, Sources};
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions};
 
@@ -57,33 +57,6 @@ impl SampleSums {
     /// Of lights, whose shadows run in any direction.
     fn mean_nearness(&self) -> Nearness {
         Nearness::of_lamp(self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32)
-    }
-
-    /// Adds samples until each replicate has `samples`; `run` is the first run's length of a [`TileSequence`].
-    fn add(
-        &mut self,
-        sources: &Sources<'_>,
-        shared: &SharedSources,
-        texel: &Texel,
-        run: u32,
-        samples: u32,
-        seed: u32,
-    ) {
-        for (replicate, sum) in self.sums.iter_mut().enumerate() {
-            let sequence = TileSequence::new(seed, Stream::SharedLight(replicate as u32), texel, run);
-            for sample in self.samples..samples {
-                let [x, y, ..] = sequence.first(sample);
-                let Some(point) = texel.point(sources.scene, x, y) else { continue };
-                let receiver = receiver(sources.scene, &point);
-                let [choice, u, v, _] = sequence.point(sample, 1);
-                let light = sources.sample(shared, &receiver, [choice, u, v]);
-                *sum += light.baked;
-                self.mixed += light.mixed;
-                self.inverse_distances += light.inverse_distance;
-                self.rays += u32::from(light.has_ray);
-            }
-        }
-        self.samples = self.samples.max(samples);
     }
 }
 
@@ -146,16 +119,24 @@ impl<'a> SharedLight<'a> {
     /// Adds samples to the sums of a texel until each replicate has `samples`.
     fn add(&self, place: usize, sums: &mut SampleSums, samples: u32) {
         let (texel, shared) = (&self.texels[place], &self.cuts.of(CoveredTexel::new(place)).shared);
-        if !texel.is_hidden() && !shared.is_empty() {
-            sums.add(
-                self.sources,
-                shared,
-                texel,
-                self.first,
-                samples,
-                hash(self.options.seed ^ Stream::SharedLight(0).number()),
-            );
+        if texel.is_hidden() || shared.is_empty() {
+            return;
         }
+        let (scene, seed) = (self.sources.scene, hash(self.options.seed ^ Stream::SharedLight(0).number()));
+        for (replicate, sum) in sums.sums.iter_mut().enumerate() {
+            let sequence = TileSequence::new(seed, Stream::SharedLight(replicate as u32), texel, self.first);
+            for sample in sums.samples..samples {
+                let [x, y, ..] = sequence.first(sample);
+                let Some(point) = texel.point(scene, x, y) else { continue };
+                let [choice, u, v, _] = sequence.point(sample, 1);
+                let light = self.sources.sample(shared, &receiver(scene, &point), [choice, u, v]);
+                *sum += light.baked;
+                sums.mixed += light.mixed;
+                sums.inverse_distances += light.inverse_distance;
+                sums.rays += u32::from(light.has_ray);
+            }
+        }
+        sums.samples = sums.samples.max(samples);
     }
 
     /// The light of individually sampled sources plus that of shared ones, without smoothing, as far as it is known.

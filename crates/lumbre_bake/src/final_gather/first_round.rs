@@ -21,7 +21,7 @@ use crate::{BakeError, BakeOptions};
 /// at sixteen and at 64 texels per metre.
 const SAMPLES_PER_EVALUATION: f64 = 0.8;
 /// The sides of the blocks in which one texel may stand for the others, in texels.
-const BLOCK: u32 = 2;
+const BLOCK_SIDE: u32 = 2;
 /// Estimated fraction of the stage's progress from now on that a round makes up.
 pub(crate) const ROUND_PROGRESS: f32 = 0.7;
 /// The same for a first sample of one texel of each block, and for that of the others.
@@ -99,7 +99,7 @@ fn representatives(texels: &CoveredTexels<'_>) -> Vec<CoveredTexel> {
                 return place;
             }
             let map = &texels.layout.maps[texel.object as usize];
-            let corner = map.texel(texel.x / BLOCK * BLOCK, texel.y / BLOCK * BLOCK);
+            let corner = map.texel(texel.x / BLOCK_SIDE * BLOCK_SIDE, texel.y / BLOCK_SIDE * BLOCK_SIDE);
             whole_at(corner).filter(|&corner| chart(corner) == chart(place)).unwrap_or(place)
         })
         .collect()
@@ -119,7 +119,7 @@ fn copy_representatives(representatives: &[CoveredTexel], gathered: &mut [Gather
         let light = f64::from(mean(&estimates).element_sum()) / 3.0;
         let noise = f64::from(variance(&estimates).element_sum()) / 3.0;
         squared_light += light * light - noise;
-        if let Some((_, other, other_noise)) = before.filter(|(other, ..)| other.0 + BLOCK == place.0) {
+        if let Some((_, other, other_noise)) = before.filter(|(other, ..)| other.0 + BLOCK_SIDE == place.0) {
             squared_differences += (light - other).powi(2) - noise - other_noise;
         }
         before = Some((place, light, noise));

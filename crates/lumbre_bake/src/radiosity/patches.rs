@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 use glam::{DMat2, DVec2, Vec3};
 use rayon::prelude::*;
 
-use super::bsp::{BspTrees, Corners, CutCell};
+use super::bsp::{BspTrees, CutCell};
 use super::patch_index::PatchIndex;
-use crate::scene::mean_of_points::mean_of_points;
+use crate::scene::mean_of_points::{SubTriangle, mean_of_points};
 use crate::visibility::PlaneFrame;
 use crate::visibility::contacts::contacts;
 
@@ -412,16 +412,16 @@ fn cells_along(divisions: u32, [p, q]: [DVec2; 2], mut visit: impl FnMut(u32)) {
 }
 
 /// The corners of a patch in barycentric weights of its own.
-const CORNERS: Corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
+const CORNERS: SubTriangle = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
 
 /// Area of a piece as a share of its triangle's.
-fn area_share(corners: &Corners) -> f32 {
+fn area_share(corners: &SubTriangle) -> f32 {
     let [a, b, c] = *corners;
     ((b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1)).abs()
 }
 
 /// The point of a triangle with the given corners at barycentric weights (u, v).
-fn point_between([a, b, c]: &Corners, u: f32, v: f32) -> (f32, f32) {
+fn point_between([a, b, c]: &SubTriangle, u: f32, v: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
 }
 
@@ -431,7 +431,7 @@ fn reflectance_and_texels(
     scene: &BakeScene,
     index: usize,
     side: Side,
-    corners: &Corners,
+    corners: &SubTriangle,
 ) -> (Vec3, Option<f32>) {
     let triangle = &scene.triangles[index];
     let surface = &scene.surfaces[triangle.surface as usize];

@@ -10,11 +10,12 @@ use super::changed_box::ChangedBox;
 use super::direct_light_invalidation::{ShadowVolumes, shadowed};
 use super::fingerprints::{bounds, emission, fingerprint, first_triangles, layouts};
 use super::samples::{Content, ObjectSamples, TexelSamples};
-use crate::BakeOptions;
 use crate::content_hash::{ContentHash, Hashes};
-use crate::coverage::{CoveredTexels, Texel};
+use crate::coverage::CoveredTexels;
+use crate::final_gather::ReusedGather;
 use crate::scene::{Canonical, SceneObject, density_of};
 use crate::sources::{Direct, Sources};
+use crate::{BakeOptions, RebakeReport};
 
 /// With more changed objects than this the whole scene is baked.
 const MAX_CHANGED: usize = 64;
@@ -164,10 +165,19 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// Number of covered texels whose direct light is computed anew.
-    pub fn relit(&self, texels: &[Texel]) -> usize {
-        let pairs = texels.iter().zip(&self.known_direct);
-        pairs.filter(|(texel, known)| known.is_none() && !texel.is_hidden()).count()
+    /// What is kept of the former bake, of whose light by bounces that is `kept`. `mean` is the mean irradiance, mean of
+    /// the channels, W/m².
+    pub fn report(&self, texels: &CoveredTexels<'_>, kept: Option<&ReusedGather>, mean: f64) -> RebakeReport {
+        let open = texels.open().count();
+        let error = kept.map_or(0.0, |kept| kept.error(open));
+        RebakeReport {
+            whole: String::new(),
+            changed: self.names.clone(),
+            texels: open,
+            relit: texels.open().filter(|(texel, _)| self.known_direct[texel.place()].is_none()).count(),
+            gathered: kept.map_or(0, |kept| open - kept.count()),
+            neglected: if mean > 0.0 { error / mean } else { 0.0 },
+        }
     }
 }
 

@@ -45,7 +45,7 @@ enum Source {
 }
 
 /// Texels along the side of a block that is tested as a whole.
-const BLOCK: u32 = 8;
+const BLOCK_SIDE: u32 = 8;
 /// Longer than any path through a scene whose coordinates are below 2.25.
 const FAR: f32 = 16.0;
 /// Places in a texel of a smooth surface at which its height above the facets is taken into account.
@@ -81,7 +81,7 @@ impl ShadowVolumes {
 /// Per covered texel, whether a box may block light that reaches it, or may have blocked it.
 pub(crate) fn shadowed(texels: &CoveredTexels<'_>, volumes: &ShadowVolumes) -> Vec<bool> {
     let CoveredTexels { scene, list, charts, .. } = texels;
-    let blocks = TexelGroups::blocks(list, charts, BLOCK);
+    let blocks = TexelGroups::blocks(list, charts, BLOCK_SIDE);
     let is_shadowed: Vec<bool> = blocks
         .members
         .par_iter()

@@ -33,7 +33,7 @@ use crate::{BakeError, BakeOptions};
 /// Rays from a patch or from a block of texels. Every other one is aimed at what has changed.
 const RAYS: u32 = 32;
 /// Texels along the side of a block.
-const BLOCK: u32 = 4;
+const BLOCK_SIDE: u32 = 4;
 /// Nothing is kept of texels that are nearer to a changed box than this share of its size.
 const NEAR_BOX: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
@@ -109,7 +109,7 @@ impl<'a> IndirectChange<'a> {
             scene: sources.scene,
             texels,
             changes,
-            blocks: TexelGroups::blocks(&texels.list, &texels.charts, BLOCK),
+            blocks: TexelGroups::blocks(&texels.list, &texels.charts, BLOCK_SIDE),
             direct: change,
             sky: sources.sky,
             spheres: changes.boxes.iter().map(|b| (b.center(), b.radius())).collect(),
@@ -138,21 +138,18 @@ impl<'a> IndirectChange<'a> {
         let is_new = |patch: &Patch| {
             self.changes.changed[self.scene.triangles[patch.triangle as usize].object as usize]
         };
-        let immediate: Vec<(Vec3, Vec3)> = in_chunks(patches.list.len(), monitor, |index| {
+        let immediate: Vec<Range> = in_chunks(patches.list.len(), monitor, |index| {
             let patch = &patches.list[index];
             if is_new(patch) || patch.reflectance == Vec3::ZERO {
-                return (Vec3::ZERO, Vec3::ZERO);
+                return [Vec3::ZERO; 2];
             }
             let sequence = Sequence::new(options.seed, Stream::ChangedPatches, index as u32);
             let point = |x: f32, y: f32| {
                 let at = patches.point(patch, triangle_point(x, y));
                 Some(Receiver::on_facet(self.scene, patch.triangle, patch.side, at))
             };
-            self.sampled_change(sequence, &|_, x, y| point(x, y), light).means().into()
+            self.sampled_change(sequence, &|_, x, y| point(x, y), light).means()
         })?;
-        let bound = |which: usize, patch: usize| {
-            if which == 0 { immediate[patch].0 } else { immediate[patch].1 }
-        };
         // One job per bound and channel.
         let solve = |job: usize| {
             let (which, channel) = (job / 3, job % 3);
@@ -167,7 +164,7 @@ impl<'a> IndirectChange<'a> {
                 let emission: Vec<f64> = reflectance
                     .iter()
                     .enumerate()
-                    .map(|(patch, rho)| rho * (sign * f64::from(bound(which, patch)[channel])).max(0.0))
+                    .map(|(patch, rho)| rho * (sign * f64::from(immediate[patch][which][channel])).max(0.0))
                     .collect();
                 gather(factors, &solver.solve(factors, &reflectance, &emission, TOLERANCE).radiosity)
             });
@@ -177,7 +174,7 @@ impl<'a> IndirectChange<'a> {
             monitor.run_interruptible(1.0, || (0..6usize).into_par_iter().map(solve).collect())?;
         let change = |which: usize, patch: usize| {
             let [red, green, blue] = [0, 1, 2].map(|channel| solved[3 * which + channel][patch]);
-            bound(which, patch) + DVec3::new(red, green, blue).as_vec3()
+            immediate[patch][which] + DVec3::new(red, green, blue).as_vec3()
         };
         Ok((0..patches.list.len()).map(|patch| [change(0, patch), change(1, patch)]).collect())
     }

@@ -62,7 +62,7 @@ impl Room {
 }
 
 /// A closed piece of a mesh, with its number and bounding box.
-pub(crate) struct Piece {
+pub(crate) struct ClosedShell {
     pub number: u32,
     pub bounds: Bounds<Vec3>,
     /// Present if its fronts face inward.
@@ -71,7 +71,7 @@ pub(crate) struct Piece {
 
 /// The closed pieces in ascending order of their numbers. `pieces` gives for each triangle the number of its closed
 /// piece, if any.
-pub(crate) fn pieces(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<Piece> {
+pub(crate) fn closed_shells(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<ClosedShell> {
     let mut order: Vec<(u32, usize)> =
         pieces.iter().enumerate().filter_map(|(index, piece)| Some(((*piece)?, index))).collect();
     order.sort_unstable();
@@ -86,7 +86,7 @@ pub(crate) fn pieces(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<Pie
         }
         let bounds = corners.iter().flatten().copied().collect();
         let room = (volume < 0.0).then(|| Room::new(&corners, bounds));
-        Piece { number: same[0].0, bounds, room }
+        ClosedShell { number: same[0].0, bounds, room }
     };
     order.chunk_by(|a, b| a.0 == b.0).map(piece).collect()
 }
@@ -113,7 +113,10 @@ mod tests {
     use super::*;
 
     fn rooms_of(triangles: &[[Vec3; 3]]) -> Vec<Room> {
-        pieces(triangles, &closed_pieces(triangles)).into_iter().filter_map(|piece| piece.room).collect()
+        closed_shells(triangles, &closed_pieces(triangles))
+            .into_iter()
+            .filter_map(|piece| piece.room)
+            .collect()
     }
 
     #[test]

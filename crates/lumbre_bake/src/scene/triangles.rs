@@ -11,7 +11,7 @@ use super::duplicates::is_hidden_duplicate;
 use super::hidden_side::closed_pieces;
 use super::leaks::Leaks;
 use super::material::{LARGEST_REFLECTANCE, Side};
-use super::rooms::{Room, all_within, pieces};
+use super::rooms::{Room, all_within, closed_shells};
 use super::texture_coordinates::textures_of;
 use super::{LightmapLayout, MapLayout, PlacedPrimitive, SceneObject, SurfaceMaterial, world_points};
 use crate::BakeError;
@@ -329,7 +329,7 @@ impl Extraction<'_> {
         let triangles = &mut self.triangles[first..];
         let corners: Vec<[Vec3; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
         let piece_numbers = closed_pieces(&corners);
-        let pieces = pieces(&corners, &piece_numbers);
+        let pieces = closed_shells(&corners, &piece_numbers);
         for (triangle, piece_number) in triangles.iter_mut().zip(&piece_numbers) {
             triangle.closed = piece_number.is_some();
             triangle.two_sided &= piece_number.is_none();

@@ -16,7 +16,7 @@ use super::share_variance::{share_variance, uneven_variance};
 use crate::color::channel_mean;
 use crate::scene::Receiver;
 use crate::visibility::visible_part::visible_part;
-use crate::visibility::{LampOccluders, Pieces};
+use crate::visibility::{LampOccluders, PolygonClipper};
 
 /// An estimate of the visible fraction of a source's light, per channel.
 struct VisibleFraction {
@@ -111,7 +111,7 @@ impl Sources<'_> {
         let (mut sums, mut counts) = ([Vec3::ZERO; BATCHES], [0u32; BATCHES]);
         let (mut least, mut most) = (f32::INFINITY, 0.0f32);
         let (mut seen, mut hidden) = (0, 0);
-        let mut pieces = Pieces::new();
+        let mut pieces = PolygonClipper::new();
         for sample in 0..points {
             let [x, y, ..] = sampled.sequence.point(sample, set);
             let Some(receiver) = (sampled.point)(x, y) else { continue };

@@ -76,7 +76,7 @@ struct Coarsening {
 struct EmissionSampling {
     /// Texels along the longest edge.
     texels: f32,
-    /// Pieces along an edge.
+    /// PolygonClipper along an edge.
     pieces: u32,
     /// Points along an edge of a piece.
     points: u32,

@@ -23,6 +23,6 @@ pub(crate) mod source_tree;
 
 pub(crate) use direct::{Direct, VisibilitySummary};
 pub(crate) use emitters::Emitter;
-pub(crate) use light_cut::{LightCut, SharedSources};
+pub(crate) use light_cut::LightCut;
 pub(crate) use light_sources::Sources;
 pub(crate) use sampled_receiver::SampledReceiver;

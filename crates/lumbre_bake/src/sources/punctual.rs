@@ -19,7 +19,7 @@ use crate::sampling::{cosine_direction, frame};
 use crate::scene::Receiver;
 use crate::scene::{BakeScene, PlacedLight};
 use crate::visibility::cut_out::GAP;
-use crate::visibility::{LightVisibility, Pieces, ReceiverShape};
+use crate::visibility::{LightVisibility, PolygonClipper, ReceiverShape};
 
 /// Offset of the lights' ids in [`VisibilitySummary::add`](super::direct::VisibilitySummary::add); lower ids are nodes
 /// of the emitter tree.
@@ -195,7 +195,7 @@ impl Sources<'_> {
             return (mean.x, variance);
         };
         let Some(middle) = point(0.5, 0.5) else { return (0.0, 0.0) };
-        let (mut sum, mut lit, mut pieces) = (0.0, 0.0, Pieces::new());
+        let (mut sum, mut lit, mut pieces) = (0.0, 0.0, PolygonClipper::new());
         let is_exact = origin.lit(shape, shadows, &mut pieces, |place: DVec3, share| {
             sum += share * f64::from(arriving(&Receiver { position: place.as_vec3(), ..middle }));
             lit += share;

@@ -18,8 +18,8 @@ pub(crate) struct Area {
     pub normal: DVec3,
 }
 
-/// Corners of a triangle.
-pub(crate) type Corners = [DVec3; 3];
+/// Triangle of a triangle.
+pub(crate) type Triangle = [DVec3; 3];
 
 /// Distance relative to the coordinates up to which things count as touching: the offset of ray origins from surfaces.
 const CONTACT: f64 = 16.0 / (1 << 24) as f64;
@@ -107,7 +107,7 @@ const CUBE_EDGES: [[usize; 2]; 12] =
 impl Shaft {
     /// The shaft to a triangle that emits on the side of its `normal`. `None` if no light can pass, because the
     /// triangle is entirely behind the area or the area behind the triangle.
-    pub fn new(area: &Area, [p, q, r]: Corners, normal: Vec3) -> Option<Self> {
+    pub fn new(area: &Area, [p, q, r]: Triangle, normal: Vec3) -> Option<Self> {
         let mut shaft = Self::before(area, &[p, q, r]);
         let normal = normal.as_dvec3();
         let slack = shaft.slack(normal, shaft.extent);
@@ -217,7 +217,7 @@ impl Shaft {
     }
 
     /// Whether a triangle, whose largest absolute coordinate is `extent`, may reach into the shaft.
-    pub fn may_meet(&self, corners: &Corners, extent: f64) -> bool {
+    pub fn may_meet(&self, corners: &Triangle, extent: f64) -> bool {
         for (place, plane) in self.planes.iter().enumerate() {
             let slack = if place < self.touched { self.slack(plane.normal, extent) } else { 0.0 };
             let inner = plane.height - slack;
