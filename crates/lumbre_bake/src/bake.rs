@@ -252,7 +252,7 @@ fn run(
     };
     let exchange = exchange.map(|(exchange, _)| exchange);
     let (indirect, gathered, cache) = match &exchange {
-        None => (IndirectLight::none(&direct), None, None),
+        None => (IndirectLight::none(&texels, &direct), None, None),
         Some(exchange) => {
             monitor.stage(Stage::FinalGather)?;
             let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, monitor)?;

@@ -28,6 +28,9 @@ pub(crate) fn layout(
     })?
 }
 
+/// The scene with its hierarchies, the layout of its maps and the triangles that emit light.
+type SceneToBake = (BakeScene, LightmapLayout, Vec<Emitter>);
+
 /// Builds the scene with its hierarchies, and finds the triangles that emit light. Also returns `layout`, which the
 /// detached thread takes by value.
 pub(crate) fn scene(
@@ -35,7 +38,7 @@ pub(crate) fn scene(
     layout: LightmapLayout,
     space: Canonical,
     monitor: &mut BakeMonitor<'_>,
-) -> Result<((BakeScene, LightmapLayout, Vec<Emitter>), StageNotes), BakeError> {
+) -> Result<(SceneToBake, StageNotes), BakeError> {
     let (shared_input, stop) = (Arc::clone(input), monitor.stop().clone());
     let (scene, layout, warnings) = monitor.run_detached(0.0, move || {
         let mut warnings = Vec::new();

@@ -65,8 +65,8 @@ pub(crate) fn write_errors(
     report.mean_irradiance = mean_irradiance(&texels.list, light).to_array();
     let mean = report.mean_of_channels();
     let gathered = gathered.unwrap_or_else(|| {
-        let ledger = ErrorLedger::of_direct_light(direct);
-        let error = MapError::new(&ledger, &indirect.variances, &texels.list, &direct.local, mean);
+        let ledger = ErrorLedger::of_direct_light(texels, direct);
+        let error = MapError::new(&ledger, &indirect.variances, mean);
         let ended = Ended::after(error.relative <= options.error, monitor.is_late(), true);
         let curve = vec![ErrorAtTime { seconds: monitor.seconds(), error: error.relative }];
         GatherReport { error, curve, ended, leaked_rays: 0, gather_rays: 0.0 }

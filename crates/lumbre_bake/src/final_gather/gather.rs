@@ -138,7 +138,7 @@ impl RadianceCache<'_> {
         for (replicate, sample) in tags {
             let [x, y, u, v] = sequences[replicate].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
-                let patch = self.patches.at(point.triangle, Side::Front, point.at);
+                let patch = self.exchange.patches.at(point.triangle, Side::Front, point.at);
                 let region = patch.and_then(|patch| self.guide.region_of(patch));
                 let request = GatherRequest { receiver: receiver(self.scene, &point), region, u, v };
                 wavefronts.samples.push(request, (replicate, sample));
@@ -200,7 +200,7 @@ impl RadianceCache<'_> {
             let leaving = |hit: &Hit| incident.weight * hit.reflectance * (hit.direct + hit.indirect);
             let real_bounce = incident.hit.as_ref().map_or(incident.light, leaving);
             contributions[slot].rays += 1;
-            contributions[slot].difference *= self.patch_indirect[patch.place()] - real_bounce;
+            contributions[slot].difference *= self.exchange.indirect[patch.place()] - real_bounce;
         }
         for (slot, (contribution, &(replicate, _))) in contributions.iter().zip(tags).enumerate() {
             gathered.sums[replicate] += contribution.light;
@@ -242,8 +242,8 @@ impl RadianceCache<'_> {
         let mut receiver = *receiver;
         // In a gap narrower than patches a path may bounce many times.
         for bounce in 0..NEAR_BOUNCES {
-            let is_coarse =
-                last.variance.is_none() && last.distance < self.min_read_distance[last.patch.place()];
+            let is_coarse = last.variance.is_none()
+                && last.distance < self.exchange.min_read_distance[last.patch.place()];
             if !is_coarse || weight == Vec3::ZERO {
                 break;
             }

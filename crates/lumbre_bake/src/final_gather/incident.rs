@@ -139,7 +139,7 @@ impl RadianceCache<'_> {
             path.texel = None;
             let Some(hit) = &mut result.hit else { continue };
             if let SampleTarget::Direction(_) = path.target {
-                let Some(patch) = self.patches.at(hit.triangle, hit.side, hit.at) else {
+                let Some(patch) = self.exchange.patches.at(hit.triangle, hit.side, hit.at) else {
                     *result = IncidentSample::default();
                     continue;
                 };
@@ -162,8 +162,8 @@ impl RadianceCache<'_> {
                 hit.reflectance = self.reflectance_at(hit.triangle, hit.side, hit.at);
             }
             if hit.variance.is_none() {
-                hit.indirect = self.patch_indirect[hit.patch.place()];
-                hit.error = self.patch_error[hit.patch.place()];
+                hit.indirect = self.exchange.indirect[hit.patch.place()];
+                hit.error = self.exchange.indirect_error[hit.patch.place()];
             }
             if let (SampleTarget::Direction(_), Some(region), Some(_)) =
                 (&path.target, request.region, path.guided_share)
@@ -174,7 +174,7 @@ impl RadianceCache<'_> {
         for ((path, request), result) in paths.iter().zip(requests).zip(results) {
             let Some(hit) = &mut result.hit else { continue };
             if hit.direct.x.is_nan() {
-                hit.direct = self.patch_direct[hit.patch.place()];
+                hit.direct = self.exchange.direct[hit.patch.place()];
             }
             if let Some(share) = path.guided_share {
                 match self.weight(request, path, share, hit) {
@@ -224,7 +224,7 @@ impl RadianceCache<'_> {
                         result.weight = 1.0;
                     }
                     SurfaceHit::None => {
-                        (result.light, result.weight) = (self.sky / cosine_share, 1.0 / cosine_share);
+                        (result.light, result.weight) = (self.sources.sky / cosine_share, 1.0 / cosine_share);
                     }
                     SurfaceHit::Back | SurfaceHit::Inside => result.weight = 1.0 / cosine_share,
                 }
@@ -252,9 +252,9 @@ impl RadianceCache<'_> {
     #[inline]
     fn point_of(&self, receiver: &Receiver, guided: GuidedPatch, v: f32) -> Option<SampleTarget> {
         let GuidedPatch { patch, u, density } = guided;
-        let chosen = &self.patches.list[patch.place()];
+        let chosen = &self.exchange.patches.list[patch.place()];
         let (triangle, side) = (chosen.triangle, chosen.side);
-        let at = self.patches.point(chosen, triangle_point(u, v));
+        let at = self.exchange.patches.point(chosen, triangle_point(u, v));
         let surface = &self.scene.triangles[triangle as usize];
         let position = surface.position(at.0, at.1);
         let offset = position - receiver.position;

@@ -41,7 +41,7 @@ pub(crate) fn learn(cache: &mut RadianceCache<'_>, texels: &[Texel], gathered: &
     }
     cache.discoveries.sort_by_key(|discovery| discovery.receiver);
     gathered.par_iter_mut().for_each(|sums| sums.unguided = UnguidedLight::default());
-    cache.guide = Cow::Owned(cache.guide_of_patches.with(&cache.discoveries));
+    cache.guide = Cow::Owned(cache.exchange.guide.with(&cache.discoveries));
 }
 
 /// Whether one of a texel's samples outweighs the others, and the guide would hardly have led to it.
@@ -56,7 +56,7 @@ fn region_of(cache: &RadianceCache<'_>, texel: &Texel) -> Option<Region> {
         return None;
     }
     let point = texel.point(cache.scene, 0.5, 0.5)?;
-    cache.guide.region_of(cache.patches.at(point.triangle, Side::Front, point.at)?)
+    cache.guide.region_of(cache.exchange.patches.at(point.triangle, Side::Front, point.at)?)
 }
 
 #[cfg(test)]

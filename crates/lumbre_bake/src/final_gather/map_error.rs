@@ -2,8 +2,6 @@
 
 use super::error_ledger::{ErrorLedger, open_sum, relative_to, root};
 use crate::ErrorPart;
-use crate::coverage::Texel;
-use crate::direct_light::LocalLight;
 use crate::squared_errors::SquaredErrors;
 
 /// The expected error over all texels that are not hidden.
@@ -21,21 +19,14 @@ pub(crate) struct MapError {
 impl MapError {
     /// Sums up `errors`, the ledger's total per texel. `mean` is the map's mean irradiance in W/m², mean of the
     /// channels.
-    pub fn new(
-        ledger: &ErrorLedger<'_>,
-        errors: &SquaredErrors,
-        texels: &[Texel],
-        local: &LocalLight,
-        mean: f64,
-    ) -> Self {
-        let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
-        let relative_squares =
-            open_sum(texels, &local.relative(&errors.expected)) - ledger.by_chance(texels, local);
+    pub fn new(ledger: &ErrorLedger<'_>, errors: &SquaredErrors, mean: f64) -> Self {
+        let open = ledger.open_texels();
+        let relative_squares = ledger.relative_sum(&errors.expected) - ledger.by_chance();
         Self {
             relative_squares,
             relative: root(relative_squares / open),
-            of_mean: relative_to(mean, open_sum(texels, &errors.expected) / open),
-            parts: ledger.parts(texels, local),
+            of_mean: relative_to(mean, open_sum(&ledger.texels.list, &errors.expected) / open),
+            parts: ledger.parts(),
         }
     }
 }

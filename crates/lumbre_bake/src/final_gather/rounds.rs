@@ -15,14 +15,13 @@ use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
 use crate::chunks::decide;
 use crate::color::wide_channel_mean;
-use crate::coverage::{CoveredTexels, Texel};
+use crate::coverage::CoveredTexels;
 use crate::denoise::replicates::mean;
 use crate::denoise::{Denoised, Estimates, Neighbourhoods, REPLICATES};
-use crate::direct_light::{DirectLight, LocalLight};
+use crate::direct_light::DirectLight;
 use crate::monitor::{BakeMonitor, Clock};
 use crate::report::StageNotes;
 use crate::sample_allocation::{SampleAllocation, added, allocate_within};
-use crate::sources::Direct;
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions, Ended, ErrorAtTime};
@@ -69,8 +68,8 @@ pub(crate) struct IndirectLight {
 
 impl IndirectLight {
     /// For a scene where nothing bounces: no light, and the errors of direct light alone.
-    pub fn none(direct: &DirectLight) -> Self {
-        Self { variances: ErrorLedger::of_direct_light(direct).total(), ..Self::default() }
+    pub fn none(texels: &CoveredTexels<'_>, direct: &DirectLight) -> Self {
+        Self { variances: ErrorLedger::of_direct_light(texels, direct).total(), ..Self::default() }
     }
 
     /// The sum of direct and indirect light of every covered texel, W/m².
@@ -115,10 +114,10 @@ pub(crate) fn gather(
     speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
     let mut plan: Option<RoundPlan> = None;
     let mut stalled_rounds = 0;
-    let mut reads = TexelReads::new(cache.patches.mean_reflectance(), &gathered);
+    let mut reads = TexelReads::new(cache.exchange.patches.mean_reflectance(), &gathered);
     let (result, ended) = loop {
         let begun = monitor.seconds();
-        let result = planner.evaluate(&gathered, &reads, cache.residual_bound, monitor)?;
+        let result = planner.evaluate(&gathered, &reads, cache.exchange.residual_bound, monitor)?;
         let error = result.error.relative;
         let is_reached = error <= options.error;
         curve.push(ErrorAtTime { seconds: result.seconds, error });
@@ -191,9 +190,8 @@ impl CastSpeed {
 /// Estimates light and errors after each round, and decides where the next one casts its rays.
 struct RoundPlanner<'a> {
     neighbourhoods: &'a Neighbourhoods<'a>,
-    texels: &'a [Texel],
-    direct: &'a [Direct],
-    local: &'a LocalLight,
+    texels: &'a CoveredTexels<'a>,
+    direct: &'a DirectLight,
     /// The covered texels that are not hidden.
     open: Vec<CoveredTexel>,
     /// Mean direct light of the open texels, W/m², mean of the channels.
@@ -254,9 +252,8 @@ impl<'a> RoundPlanner<'a> {
         let sum = direct.texels.iter().map(|direct| wide_channel_mean(direct.baked)).sum::<f64>();
         Self {
             neighbourhoods,
-            texels: list,
-            direct: &direct.texels,
-            local: &direct.local,
+            texels,
+            direct,
             mean_direct: sum / open.len().max(1) as f64,
             open,
             reuse_error: reused.map_or(&[], |reused| &reused.reuse_error),
@@ -284,12 +281,13 @@ impl<'a> RoundPlanner<'a> {
         residual_bound: f64,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<RoundResult, BakeError> {
-        let (neighbourhoods, texels, local) = (self.neighbourhoods, self.texels, self.local);
+        let neighbourhoods = self.neighbourhoods;
         let raw: Vec<Estimates> = gathered.par_iter().map(GatherSums::estimates).collect();
         let nearness = |place: usize| gathered[place].mean_nearness();
         let denoised = Denoised::new(neighbourhoods, &raw, nearness, self.options.denoise, monitor)?;
-        let patches =
-            monitor.run_interruptible(1.0, || patch_bias(neighbourhoods, texels, gathered, &raw, reads))?;
+        let patches = monitor.run_interruptible(1.0, || {
+            patch_bias(neighbourhoods, &self.texels.list, gathered, &raw, reads)
+        })?;
         let bounced = denoised.estimates.iter().map(|e| wide_channel_mean(mean(e))).sum::<f64>();
         let total = self.mean_direct + bounced / self.count();
         let gather = GatherErrors {
@@ -299,10 +297,10 @@ impl<'a> RoundPlanner<'a> {
             residual_bound,
             kept: self.reuse_error,
         };
-        let ledger = ErrorLedger { direct: self.direct, gather: Some(gather), light: total as f32 };
+        let (texels, direct) = (self.texels, self.direct);
+        let ledger = ErrorLedger { texels, direct, gather: Some(gather), light: total as f32 };
         let variances = ledger.total();
-        let new_error = || MapError::new(&ledger, &variances, texels, local, total);
-        let error = monitor.run_interruptible(1.0, new_error)?;
+        let error = monitor.run_interruptible(1.0, || MapError::new(&ledger, &variances, total))?;
         let seconds = monitor.seconds();
         monitor.note_error(error.relative);
         monitor.advance(1.0)?;
@@ -317,8 +315,8 @@ impl<'a> RoundPlanner<'a> {
         // From the second round on, rays read the light of texels instead of patches, and so also reduce the error that
         // was read from patches. The bias that is measured by checks against real bounces is not counted as reducible.
         let read: Vec<f32> = gathered.par_iter().map(GatherSums::squared_read_error).collect();
-        let by_rays = self.local.relative_errors(&result.reducible.with(&read));
-        let reducible_error = open_sum(self.texels, &by_rays.expected);
+        let by_rays = self.direct.local.relative_errors(&result.reducible.with(&read));
+        let reducible_error = open_sum(&self.texels.list, &by_rays.expected);
         let irreducible_error = result.error.relative_squares - reducible_error;
         let requested = self.count() * self.options.error.powi(2);
 
@@ -342,7 +340,8 @@ impl<'a> RoundPlanner<'a> {
             .max(MIN_REDUCIBLE * irreducible_error)
             .max(reducible_error / MAX_REDUCTION);
         // Rays are allocated by the cautious errors, so the goal for the expected ones is scaled to those.
-        let goal = goal * open_sum(self.texels, &by_rays.cautious) / reducible_error.max(f64::MIN_POSITIVE);
+        let goal =
+            goal * open_sum(&self.texels.list, &by_rays.cautious) / reducible_error.max(f64::MIN_POSITIVE);
         let open = self.open.iter().copied();
         let errors = &by_rays.cautious;
         let within = |budget: u64| {

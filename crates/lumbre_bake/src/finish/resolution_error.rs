@@ -14,7 +14,7 @@ use crate::final_gather::{GatherSums, RadianceCache};
 use crate::monitor::BakeMonitor;
 use crate::report::{ResolutionReport, StageNotes};
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
-use crate::scene::{BakeScene, Receiver, SurfaceHit};
+use crate::scene::{Receiver, SurfaceHit};
 use crate::sources::Sources;
 use crate::stage::Stage;
 use crate::texel_index::MapTexel;
@@ -61,7 +61,7 @@ pub(crate) fn dense_points(
         return Ok((Vec::new(), StageNotes::of_skipped(format!("resolution error: {why}"))));
     }
     monitor.stage(Stage::Resolution)?;
-    let baker = PointBaker { scene: sources.scene, sources, cache };
+    let baker = PointBaker { sources, cache };
     let points = baker.bake_points(rays, options, monitor)?;
     let notes = StageNotes::of_rays(points.iter().map(|point| point.rays).sum());
     Ok((points, notes))
@@ -69,7 +69,6 @@ pub(crate) fn dense_points(
 
 /// Computes the light at single points.
 struct PointBaker<'a> {
-    scene: &'a BakeScene,
     sources: &'a Sources<'a>,
     /// `None` where nothing bounces.
     cache: Option<&'a RadianceCache<'a>>,
@@ -86,6 +85,7 @@ impl PointBaker<'_> {
         // Running sums of the triangles' areas, to choose triangles by.
         let mut area = 0.0;
         let ends: Vec<f64> = self
+            .sources
             .scene
             .triangles
             .iter()
@@ -110,7 +110,7 @@ impl PointBaker<'_> {
     fn bake_point(&self, triangle: u32, at: (f32, f32), index: u32, seed: u32) -> DensePoint {
         let mut point = DensePoint { triangle, at, ..DensePoint::default() };
         let footprint = FootprintPoint { triangle, at, offset: Vec2::splat(0.5) };
-        let receiver = receiver(self.scene, &footprint);
+        let receiver = receiver(self.sources.scene, &footprint);
         let sequence = Sequence::new(seed, Stream::ResolutionLight, index);
         point.rays += u64::from(OPEN_TEST_RAYS);
         point.counts = self.is_open(&receiver, sequence);
@@ -143,7 +143,7 @@ impl PointBaker<'_> {
         let hits_inside = |ray: &u32| {
             let [u, v, ..] = sequence.point(*ray, 0);
             let direction = cosine_about(receiver.geometric_normal, u, v);
-            let hit = self.scene.classify_hit(receiver.origin, direction);
+            let hit = self.sources.scene.classify_hit(receiver.origin, direction);
             matches!(hit, SurfaceHit::Inside | SurfaceHit::Back)
         };
         2 * (0..OPEN_TEST_RAYS).filter(hits_inside).count() < OPEN_TEST_RAYS as usize

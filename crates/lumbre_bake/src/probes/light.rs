@@ -117,7 +117,7 @@ impl ProbeLight<'_> {
                 SurfaceHit::Lit { triangle, side, at, .. } => {
                     self.cache.map_or(Vec3::ZERO, |cache| cache.leaving(triangle, side, at))
                 }
-                SurfaceHit::None => self.cache.map_or(Vec3::ZERO, |cache| cache.sky),
+                SurfaceHit::None => self.cache.map_or(Vec3::ZERO, |cache| cache.sources.sky),
                 SurfaceHit::Back | SurfaceHit::Inside => {
                     backs += 1;
                     Vec3::ZERO

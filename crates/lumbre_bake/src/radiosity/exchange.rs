@@ -33,7 +33,7 @@ pub(crate) struct Exchange {
     /// estimate of the error by the patches' size.
     pub indirect_error: Vec<Vec2>,
     /// Per patch, the distance below which it is too coarse to be read, canonical units.
-    pub near: Vec<f32>,
+    pub min_read_distance: Vec<f32>,
     /// Where each patch's light by bounces comes from.
     pub guide: SamplingGuide,
     /// Light that leaves each patch, without its emission, W/m².
@@ -144,13 +144,13 @@ impl Exchange {
             let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
             SamplingGuide::new(scene, &patches, side, &factors, &radiosity, &sky)
         })?;
-        let near = patches.near_distances(scene, side);
+        let min_read_distance = patches.min_read_distances(scene, side);
         let exchange = Self {
             patches,
             direct,
             indirect,
             indirect_error,
-            near,
+            min_read_distance,
             guide,
             exitance,
             residual_bound: report.residual_bound,
@@ -186,7 +186,7 @@ impl Exchange {
             direct: dark.clone(),
             indirect: dark.clone(),
             indirect_error: vec![Vec2::ZERO; count],
-            near: patches.near_distances(scene, side),
+            min_read_distance: patches.min_read_distances(scene, side),
             patches,
             guide,
             exitance: dark,

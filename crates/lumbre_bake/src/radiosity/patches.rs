@@ -279,7 +279,7 @@ impl Patches {
 impl Patches {
     /// Per patch, the distance below which it is too coarse to be treated as uniformly bright, canonical units: twice
     /// the length of its side, which is at most `side`.
-    pub fn near_distances(&self, scene: &BakeScene, side: f32) -> Vec<f32> {
+    pub fn min_read_distances(&self, scene: &BakeScene, side: f32) -> Vec<f32> {
         let of_patch = |patch: &Patch| {
             let [a, b, c] = self.corners(scene, patch);
             let longest = (b - a).length().max((c - b).length()).max((a - c).length());

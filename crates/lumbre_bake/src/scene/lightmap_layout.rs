@@ -201,7 +201,7 @@ impl Layouter<'_> {
         let (unwrapped, width, height) = match self.options.density {
             Density::MapSize(side) => {
                 let requested = scaled_side(&object, side);
-                let (unwrapped, side) = charted.into_square(geometry.area, requested)?;
+                let (unwrapped, side) = charted.fit_square(geometry.area, requested)?;
                 if side > requested {
                     self.warnings.push(format!(
                         "{name}: its {} charts do not fit a map of {requested} x {requested} texels; it got one of {side} x {side}",
@@ -280,7 +280,7 @@ impl ChartedObject<'_> {
 
     /// About the densest unwrap that fits a square map, with the map's side. The side is `requested`, doubled until the
     /// charts, of this total area, fit at all.
-    fn into_square(&self, area: f64, requested: u32) -> Result<(Unwrapped, u32), BakeError> {
+    fn fit_square(&self, area: f64, requested: u32) -> Result<(Unwrapped, u32), BakeError> {
         let mut side = requested;
         let sparsest = loop {
             match self.unwrap(SPARSEST, side)? {
