@@ -14,7 +14,7 @@ use crate::coverage::{Texel, TileSequence, receiver};
 use crate::denoise::replicates::mean;
 use crate::denoise::{Denoised, Estimates, Nearness, Neighbourhoods, REPLICATES};
 use crate::monitor::BakeMonitor;
-use crate::sample_allocation::{SampleAllocation, added, allocate_within};
+use crate::sample_allocation::{SampleAllocator, take_samples};
 use crate::sampling::{Stream, hash};
 use crate::sources::{Direct, Sources};
 use crate::texel_index::CoveredTexel;
@@ -170,26 +170,31 @@ impl<'a> SharedLight<'a> {
         loop {
             let relative = local.relative_errors(&self.smoothed.errors());
             let is_sampled = |texel: &CoveredTexel| self.sums[texel.place()].samples > 0;
-            let sampled = CoveredTexel::all(self.texels.len()).filter(is_sampled);
+            let sampled: Vec<CoveredTexel> =
+                CoveredTexel::all(self.texels.len()).filter(is_sampled).collect();
             let summed =
-                |squares: &[f32]| sampled.clone().map(|texel| f64::from(squares[texel.place()])).sum::<f64>();
+                |squares: &[f32]| sampled.iter().map(|texel| f64::from(squares[texel.place()])).sum::<f64>();
             let left = summed(&relative.expected);
             let is_stalled = left > STALLED * before;
             let samples: Vec<u32> = self.sums.iter().map(|sums| sums.samples).collect();
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-            let count = sampled.clone().count() as u64;
+            let count = sampled.len() as u64;
             let budget = self.options.effort().budget(count) / REPLICATES as u64;
             let budget = budget.saturating_sub(taken);
             // Samples are allocated by the cautious errors, but the goal is for the expected ones: scale it.
             let caution = summed(&relative.cautious) / left;
-            let allocate = |goal: f64| -> Vec<SampleAllocation> {
-                let (sampled, errors) = (sampled.clone(), &relative.cautious);
-                allocate_within(budget, sampled, errors, &samples, self.most, ORDER, caution * goal)
+            let allocator = SampleAllocator {
+                texels: &sampled,
+                variances: &relative.cautious,
+                samples: &samples,
+                most: self.most,
+                order: ORDER,
             };
+            let allocate = |goal: f64| allocator.within(budget, caution * goal);
             // Before a round can reach the least share, a few uncertain texels dominate and the samples of the others
             // cannot be foreseen.
             if chosen_share.is_none() && left <= MAX_REDUCTION * goal(least) {
-                let foreseen = taken + added(&allocate(goal(least)), &samples);
+                let foreseen = taken + allocator.added(&allocate(goal(least)));
                 chosen_share = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
             }
             let goal = goal(chosen_share.unwrap_or(least));
@@ -199,17 +204,14 @@ impl<'a> SharedLight<'a> {
             before = left;
             let allocated = allocate(goal.max(left / MAX_REDUCTION));
             monitor.pass(PASS);
-            let more = in_chunks_until_deadline(allocated.len(), monitor, |index| {
-                let SampleAllocation { texel, samples } = allocated[index];
-                let mut sums = self.sums[texel.place()];
-                self.add(texel.place(), &mut sums, samples);
+            let mut sums = std::mem::take(&mut self.sums);
+            let taken = take_samples(&allocated, &mut sums, monitor, |to, mut sums| {
+                self.add(to.texel.place(), &mut sums, to.samples);
                 sums
             })?;
-            if more.is_empty() {
+            self.sums = sums;
+            if taken.is_empty() {
                 return Ok(());
-            }
-            for (allocation, sums) in allocated.iter().zip(more) {
-                self.sums[allocation.texel.place()] = sums;
             }
             self.smoothed = self.smooth(monitor)?;
         }

@@ -14,11 +14,10 @@ use glam::{Vec2, Vec3};
 use super::incident::{GatherRequest, Hit, IncidentSample, SamplePath};
 use super::radiance_cache::RadianceCache;
 use crate::BakeError;
-use crate::chunks::in_chunks_until_deadline;
 use crate::coverage::{Texel, TileSequence, receiver};
 use crate::monitor::BakeMonitor;
 use crate::radiosity::PatchIndex;
-use crate::sample_allocation::SampleAllocation;
+use crate::sample_allocation::{SampleAllocation, take_samples};
 use crate::sampling::{Sequence, Stream};
 use crate::scene::{Receiver, Side};
 
@@ -102,17 +101,11 @@ impl RadianceCache<'_> {
         seed: u32,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<bool, BakeError> {
-        let new_sums = in_chunks_until_deadline(wanted.len(), monitor, |place| {
-            let SampleAllocation { texel, samples } = wanted[place];
-            let mut sums = gathered[texel.place()];
-            self.gather(&texels[texel.place()], &mut sums, samples, seed);
+        let taken = take_samples(wanted, gathered, monitor, |to, mut sums| {
+            self.gather(&texels[to.texel.place()], &mut sums, to.samples, seed);
             sums
         })?;
-        let in_time = new_sums.len() == wanted.len();
-        for (allocated, sums) in wanted.iter().zip(new_sums) {
-            gathered[allocated.texel.place()] = sums;
-        }
-        Ok(in_time)
+        Ok(taken.len() == wanted.len())
     }
 
     /// Adds the samples `gathered.samples..samples` of every replicate.

@@ -21,7 +21,7 @@ use crate::denoise::{Denoised, Estimates, Neighbourhoods, REPLICATES};
 use crate::direct_light::DirectLight;
 use crate::monitor::{BakeMonitor, Clock};
 use crate::report::StageNotes;
-use crate::sample_allocation::{SampleAllocation, added, allocate_within};
+use crate::sample_allocation::{SampleAllocation, SampleAllocator};
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions, Ended, ErrorAtTime};
@@ -342,25 +342,27 @@ impl<'a> RoundPlanner<'a> {
         // Rays are allocated by the cautious errors, so the goal for the expected ones is scaled to those.
         let goal =
             goal * open_sum(&self.texels.list, &by_rays.cautious) / reducible_error.max(f64::MIN_POSITIVE);
-        let open = self.open.iter().copied();
-        let errors = &by_rays.cautious;
-        let within = |budget: u64| {
-            allocate_within(budget, open.clone(), errors, &samples, max_samples, CONVERGENCE_ORDER, goal)
+        let allocator = SampleAllocator {
+            texels: &self.open,
+            variances: &by_rays.cautious,
+            samples: &samples,
+            most: max_samples,
+            order: CONVERGENCE_ORDER,
         };
-        let mut wanted = within(budget);
-        let is_short_of_time = added(&wanted, &samples) > affordable;
+        let mut wanted = allocator.within(budget, goal);
+        let is_short_of_time = allocator.added(&wanted) > affordable;
         let is_late = is_short_of_time && (affordable as f64) < MIN_ROUND * cast as f64;
         if is_late {
             wanted = Vec::new();
         } else if is_short_of_time {
-            wanted = within(affordable);
+            wanted = allocator.within(affordable, goal);
         }
         RoundPlan {
             reducible_error,
             is_last: (is_spent && !is_small_step) || (wanted.is_empty() && !is_late),
             is_small_step,
             is_late,
-            added: added(&wanted, &samples),
+            added: allocator.added(&wanted),
             wanted,
         }
     }

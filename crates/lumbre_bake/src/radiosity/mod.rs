@@ -25,6 +25,7 @@ pub(crate) mod size_error;
 pub(crate) mod solution;
 pub(crate) mod solver;
 pub(crate) mod stationary;
+mod triangle_cells;
 mod unseen_regions;
 
 pub(crate) use exchange::{Exchange, ExchangeReport, Resolution};
