@@ -39,8 +39,8 @@ const NEAR_BOX: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
-/// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The notes count about how many rays
-/// it took to decide.
+/// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The
+/// notes count about how many rays it took to decide.
 pub(crate) fn reused_gather(
     changes: &Changes<'_>,
     sources: &Sources<'_>,
