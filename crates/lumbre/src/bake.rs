@@ -180,18 +180,18 @@ fn interruptible(
         );
     }
     interruption.say(format!("interrupted; {}", how_to_continue(&checkpoint.path)));
-    let mut shown = Shown::new(asked.quiet);
+    let (mut shown, mut samples) = (Shown::new(asked.quiet), None);
     let baked = interruption.told(|is_asked| {
         let progress = |progress| {
             shown.update(progress);
             if is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let bake = lumbre::bake::Bake::new(options).former(former).checkpoint(checkpoint).progress(progress);
-        bake.run_keeping_samples(world)
+        let bake = lumbre::bake::Bake::new(options).former(former).checkpoint(checkpoint);
+        bake.keep_samples(&mut samples).progress(progress).run(world)
     });
     shown.finish();
     match baked {
-        Ok(done) => Ok(done),
+        Ok(report) => Ok((report, samples)),
         Err(BakeError::Cancelled { stage }) => {
             bail!(
                 "interrupted during {stage}; {} is as it was; {}",

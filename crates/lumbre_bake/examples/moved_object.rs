@@ -81,7 +81,8 @@ fn baked(
     former: Option<&Samples>,
     options: &BakeOptions,
 ) -> Result<(Texels, BakeReport, Option<Samples>), Box<dyn Error>> {
-    let (report, samples) = Bake::new(options).former(former).run_keeping_samples(&mut world)?;
+    let mut samples = None;
+    let report = Bake::new(options).former(former).keep_samples(&mut samples).run(&mut world)?;
     let mut query = world.query::<(&Lightmap, &TexelErrors)>();
     let mut maps: Vec<_> =
         query.iter(&world).map(|(map, error)| (map.image.clone(), error.0.clone())).collect();

@@ -11,7 +11,7 @@ use lumbre_scene::{
 
 use crate::UnwrappedFrom;
 use crate::baked_scene::BakedScene;
-use crate::finish::baked_maps::{BakedObject, TexelErrors};
+use crate::finish::{BakedObject, TexelErrors};
 use crate::scene::{Entities, StaticScene};
 
 /// Gives every object its lightmap and removes those of earlier bakes from all other entities; from every entity, if

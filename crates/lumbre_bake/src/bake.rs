@@ -5,28 +5,25 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::world::World;
-use lumbre_scene::{IrradianceVolume, Transform};
 
 use crate::apply::apply;
 use crate::baked_scene::BakedScene;
 use crate::checkpoint::CheckpointFile;
 use crate::chunks::decide;
 use crate::content_hash::hashes_of;
-use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::CoveredTexels;
 use crate::direct_light::{SHORT_OF_TIME, direct_light};
-use crate::final_gather::lit_texels::LitTexels;
-use crate::final_gather::radiance_cache::RadianceCache;
-use crate::final_gather::rounds::{self, IndirectLight};
-use crate::finish::baked_maps::{BakedMap, BakedObject};
+use crate::final_gather::rounds;
+use crate::final_gather::{IndirectLight, LitTexels, RadianceCache};
+use crate::finish::FinishedMaps;
 use crate::finish::finished_maps::finished_maps;
 use crate::finish::resolution_error::dense_points;
 use crate::memory;
 use crate::monitor::{BakeMonitor, Callback};
 use crate::probes;
-use crate::radiosity::exchange::Exchange;
 use crate::radiosity::patch_light::patch_light;
-use crate::radiosity::patches::Patches;
-use crate::rebake::{Reuse, Samples, rebake_report, reused_gather};
+use crate::radiosity::{Exchange, Patches};
+use crate::rebake::{Reuse, Samples, reused_gather};
 use crate::scene::{StaticScene, from_world};
 use crate::stage::Stage;
 use crate::summary;
@@ -61,24 +58,20 @@ use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, 
 /// # Ok::<(), lumbre_bake::BakeError>(())
 /// ```
 pub struct Bake<'a> {
-    options: BakeOptions,
+    request: Request<'a>,
     progress: Box<Callback<'a>>,
     cancel: CancelToken,
-    checkpoint: Option<&'a Checkpoint>,
-    former: Option<&'a Samples>,
-    keeps_samples: bool,
+    samples: Option<&'a mut Option<Samples>>,
 }
 
 impl<'a> Bake<'a> {
     /// A bake with these options, without a progress callback, a checkpoint or samples of a previous bake.
     pub fn new(options: &BakeOptions) -> Self {
         Self {
-            options: *options,
+            request: Request { options: *options, checkpoint: None, former: None, keeps_samples: false },
             progress: Box::new(|_| ControlFlow::Continue(())),
             cancel: CancelToken::default(),
-            checkpoint: None,
-            former: None,
-            keeps_samples: false,
+            samples: None,
         }
     }
 
@@ -100,7 +93,7 @@ impl<'a> Bake<'a> {
     /// the same bits as one that was not. If a checkpoint exists but cannot be resumed, the report's warnings say why.
     #[must_use]
     pub fn checkpoint(self, checkpoint: impl Into<Option<&'a Checkpoint>>) -> Self {
-        Self { checkpoint: checkpoint.into(), ..self }
+        Self { request: Request { checkpoint: checkpoint.into(), ..self.request }, ..self }
     }
 
     /// Passes the samples of a previous bake, so that texels whose light the scene's changes hardly affect are not
@@ -120,7 +113,14 @@ impl<'a> Bake<'a> {
     /// count as new.
     #[must_use]
     pub fn former(self, samples: impl Into<Option<&'a Samples>>) -> Self {
-        Self { former: samples.into(), ..self }
+        Self { request: Request { former: samples.into(), ..self.request }, ..self }
+    }
+
+    /// Puts the samples that the next bake can be given by [`Bake::former`] into `samples`. They are `None` if there was
+    /// nothing to bake, or if [`BakeOptions::time`] ended the bake.
+    #[must_use]
+    pub fn keep_samples(self, samples: &'a mut Option<Samples>) -> Self {
+        Self { request: Request { keeps_samples: true, ..self.request }, samples: Some(samples), ..self }
     }
 
     /// Bakes the static objects of a World and gives them their lightmaps.
@@ -129,20 +129,15 @@ impl<'a> Bake<'a> {
     /// [`BakeError`], which names the option, node or stage. [`BakeError::Checkpoint`] if the checkpoint's file cannot
     /// be created, or is not a checkpoint.
     pub fn run(self, world: &mut World) -> Result<BakeReport, BakeError> {
-        self.on_world(world).map(|(report, _)| report)
+        self.request.options.check()?;
+        let (scene, entities) = from_world(world);
+        let scene = Arc::new(scene.checked()?);
+        let mut baked = self.on_threads(&scene)?;
+        apply(world, &scene, &entities, &mut baked);
+        Ok(baked.report)
     }
 
-    /// As [`Bake::run`], but also returns samples that the next bake can be given by [`Bake::former`]. They are `None`
-    /// if there was nothing to bake, or if [`BakeOptions::time`] ended the bake.
-    ///
-    /// # Errors
-    /// As [`Bake::run`].
-    pub fn run_keeping_samples(self, world: &mut World) -> Result<(BakeReport, Option<Samples>), BakeError> {
-        Self { keeps_samples: true, ..self }.on_world(world)
-    }
-
-    /// Bakes plain data, without a World. With [`Bake::keep_samples`] the result also contains the samples for the next
-    /// bake.
+    /// Bakes plain data, without a World.
     ///
     /// # Errors
     /// As [`Bake::run`].
@@ -165,135 +160,124 @@ impl<'a> Bake<'a> {
     /// # Ok::<(), lumbre_bake::BakeError>(())
     /// ```
     pub fn run_scene(self, scene: StaticScene) -> Result<BakedScene, BakeError> {
-        self.options.check()?;
+        self.request.options.check()?;
         self.on_threads(&Arc::new(scene.checked()?))
     }
 
-    /// Makes [`Bake::run_scene`] return samples that the next bake can be given by [`Bake::former`].
-    #[must_use]
-    pub fn keep_samples(self) -> Self {
-        Self { keeps_samples: true, ..self }
-    }
-
-    fn on_world(self, world: &mut World) -> Result<(BakeReport, Option<Samples>), BakeError> {
-        self.options.check()?;
-        let (scene, entities) = from_world(world);
-        let scene = Arc::new(scene.checked()?);
-        let mut baked = self.on_threads(&scene)?;
-        apply(world, &scene, &entities, &mut baked);
-        Ok((baked.report, baked.samples))
-    }
-
     fn on_threads(mut self, scene: &Arc<StaticScene>) -> Result<BakedScene, BakeError> {
+        let Request { options, .. } = self.request;
         let mut bake = || {
-            let mut report = BakeReport { threads: rayon::current_num_threads(), ..BakeReport::default() };
-            let monitor = BakeMonitor::new(&mut *self.progress, self.options.time);
+            let monitor = BakeMonitor::new(&mut *self.progress, options.time);
             let mut monitor = monitor.cancelled_by(self.cancel.clone());
-            let request = Request {
-                options: &self.options,
-                checkpoint: self.checkpoint,
-                former: self.former,
-                keeps_samples: self.keeps_samples,
-            };
-            let BakeOutput { objects, maps, volume, samples } =
-                run(scene, &request, &mut monitor, &mut report)?;
-            Ok(BakedScene { objects, maps, volume, samples, report: summary::finish(report, &mut monitor) })
+            let (mut baked, samples) = run(scene, &self.request, &mut monitor)?;
+            summary::finish(&mut baked.report, &mut monitor);
+            Ok((baked, samples))
         };
-        match self.options.threads {
-            None => bake(),
+        let (baked, samples) = match options.threads {
+            None => bake()?,
             Some(threads) => {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-                pool.map_err(|error| BakeError::Threads { reason: error.to_string() })?.install(bake)
+                pool.map_err(|error| BakeError::Threads { reason: error.to_string() })?.install(bake)?
             }
+        };
+        if let Some(kept) = self.samples {
+            *kept = samples;
         }
+        Ok(baked)
     }
-}
-
-/// The result of the stages: a baked scene without its report.
-#[derive(Default)]
-struct BakeOutput {
-    objects: Vec<BakedObject>,
-    maps: Vec<BakedMap>,
-    volume: Option<(Transform, IrradianceVolume)>,
-    samples: Option<Samples>,
 }
 
 /// What the caller has requested, apart from progress and cancellation, which are the monitor's.
 struct Request<'a> {
-    options: &'a BakeOptions,
+    options: BakeOptions,
     checkpoint: Option<&'a Checkpoint>,
     former: Option<&'a Samples>,
     keeps_samples: bool,
 }
 
-/// Runs the stages in order. Each takes values that earlier stages have returned.
+/// Runs the stages in order. Each takes values that earlier stages have returned, and its notes go into the report. Also
+/// returns the samples for the next bake, if they are requested.
 fn run(
     input: &Arc<StaticScene>,
     request: &Request<'_>,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<BakeOutput, BakeError> {
-    let options = request.options;
-    monitor.stage(Stage::Layout, report)?;
-    let mut reuse = request.prepare_reuse(input, monitor, report)?;
+) -> Result<(BakedScene, Option<Samples>), BakeError> {
+    let options = &request.options;
+    monitor.stage(Stage::Layout)?;
+    let reuse = request.prepare_reuse(input, monitor)?;
+    let mut report = BakeReport {
+        content_hash: reuse.content_hash().to_string(),
+        threads: rayon::current_num_threads(),
+        rebake: reuse.refusal(),
+        ..BakeReport::default()
+    };
     if input.objects.is_empty() {
-        return Ok(nothing_to_bake("the scene has no static mesh", report));
+        return Ok((BakedScene::dark("the scene has no static mesh", report), None));
     }
     let (space, density) = (reuse.space(input), reuse.density(input, options));
-    let layout = prepare::layout(input, space, density, options, monitor, report)?;
+    let layout = report.noted(prepare::layout(input, space, density, options, monitor)?);
 
-    monitor.stage(Stage::Hierarchy, report)?;
-    let (scene, layout, emitters) = prepare::scene(input, layout, space, monitor, report)?;
-    let sources = prepare::sources(input, &scene, emitters, monitor, report)?;
+    monitor.stage(Stage::Hierarchy)?;
+    let (scene, layout, emitters) = report.noted(prepare::scene(input, layout, space, monitor)?);
+    report.triangles = scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate).count();
+    let sources = report.noted(prepare::sources(input, &scene, emitters, monitor)?);
     if sources.is_empty() {
         let why = "no surface emits, no light is static or mixed, and there is no sky";
-        return Ok(nothing_to_bake(why, report));
+        return Ok((BakedScene::dark(why, report), None));
     }
     let sample_bytes = request.sample_bytes(reuse.is_possible());
     memory::check_texels(&scene, &layout, sample_bytes, options)?;
 
-    monitor.stage(Stage::DirectLight, report)?;
-    let texels = CoveredTexels::new(&scene, &layout, monitor, report)?;
+    monitor.stage(Stage::DirectLight)?;
+    let texels = report.noted(CoveredTexels::new(&scene, &layout, monitor)?);
     let is_time_short = monitor.clock().is_past(SHORT_OF_TIME);
     let patch_options = options.for_patches(decide(monitor, is_time_short)?);
-    let resolution = monitor.run_interruptible(1.0, || {
-        memory::resolution(&scene, &texels, sample_bytes, &patch_options, report)
-    })??;
+    let resolution = report.noted(
+        monitor.run_interruptible(1.0, || memory::resolution(&texels, sample_bytes, &patch_options))??,
+    );
     let changes = monitor.run_interruptible(1.0, || reuse.changes(&input.objects, &sources, &texels))?;
     let known = changes.as_ref().map_or(&[][..], |changes| &changes.known_direct);
-    let direct = direct_light(&sources, &texels, known, options, monitor, report)?;
+    let direct = report.noted(direct_light(&sources, &texels, known, options, monitor)?);
 
-    let patch_light = |patches: &Patches| patch_light(&scene, &texels, &direct, patches);
-    let exchange = Exchange::new(&scene, &sources, &patch_options, resolution, patch_light, monitor, report)?;
+    let patch_light = |patches: &Patches| patch_light(&texels, &direct, patches);
+    let (exchange, exchanged) =
+        report.noted(Exchange::new(&sources, &patch_options, resolution, patch_light, monitor)?);
     let reused = match (&exchange, &changes) {
         (Some((exchange, factors)), Some(changes)) => {
             let exchange = (exchange, factors);
-            Some(reused_gather(changes, &sources, &texels, &direct, exchange, options, monitor, report)?)
+            let reused = reused_gather(changes, &sources, &texels, &direct, exchange, options, monitor)?;
+            Some(report.noted(reused))
         }
         _ => None,
     };
     let exchange = exchange.map(|(exchange, _)| exchange);
-    let (indirect, cache) = match &exchange {
-        None => (IndirectLight::none(&direct), None),
+    let (indirect, gathered, cache) = match &exchange {
+        None => (IndirectLight::none(&texels, &direct), None, None),
         Some(exchange) => {
-            monitor.stage(Stage::FinalGather, report)?;
+            monitor.stage(Stage::FinalGather)?;
             let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, monitor)?;
-            let indirect =
-                rounds::gather(&mut cache, &texels, &direct, reused.as_ref(), options, monitor, report)?;
-            (indirect, Some(cache))
+            let (indirect, gathered) = report.noted(rounds::gather(
+                &mut cache,
+                &texels,
+                &direct,
+                reused.as_ref(),
+                options,
+                monitor,
+            )?);
+            (indirect, Some(gathered), Some(cache))
         }
     };
-    let volume = probes::bake(input, &scene, &sources, cache.as_ref(), options, monitor, report)?;
-    let points = dense_points(&sources, cache.as_ref(), options, monitor, report)?;
+    let volume = report.noted(probes::bake(input, &scene, &sources, cache.as_ref(), options, monitor)?);
+    let points = report.noted(dense_points(&sources, cache.as_ref(), report.rays, options, monitor)?);
 
-    monitor.stage(Stage::Texels, report)?;
+    monitor.stage(Stage::Texels)?;
     let light = indirect.with(&direct);
-    let lit =
-        LitTexels { scene: &scene, texels: &texels, direct: &direct, indirect: &indirect, light: &light };
-    summary::write(&lit, cache.is_some(), &input.objects, options, monitor, report)?;
-    report.rebake = report.rebake.take().or_else(|| {
-        changes.as_ref().map(|changes| rebake_report(changes, &texels.list, reused.as_ref(), report))
-    });
+    let lit = LitTexels { texels: &texels, direct: &direct, indirect: &indirect, light: &light };
+    summary::write_stages(&lit, &resolution, exchanged, volume.as_ref(), &mut report);
+    summary::write_errors(&lit, gathered, &input.objects, options, monitor, &mut report)?;
+    if let Some(changes) = &changes {
+        report.rebake = Some(changes.report(&texels, reused.as_ref(), report.mean_of_channels()));
+    }
     let samples = match request.keeps_samples && report.ended != Ended::Time {
         // Samples that were cut short would not be good enough for a later bake that has more time.
         false => None,
@@ -302,16 +286,12 @@ fn run(
             reuse.samples(&lit, reused.as_ref(), &input.objects, &sources, &exitance.unwrap_or_default())
         })?),
     };
-    let (objects, maps) = finished_maps(&lit, &points, &input.objects, options, monitor, report)?;
+    let mean = report.mean_of_channels();
+    let finished = finished_maps(&lit, &points, mean, &input.objects, options, monitor)?;
+    let FinishedMaps { objects, maps, atlases, seams, resolution } = report.noted(finished);
+    report = BakeReport { maps: maps.len(), atlases, seams, resolution, ..report };
     let volume = volume.map(|placed| (placed.grid.transform(space), placed.volume));
-    Ok(BakeOutput { objects, maps, volume, samples })
-}
-
-/// Reports why there is no light to bake.
-fn nothing_to_bake(why: &str, report: &mut BakeReport) -> BakeOutput {
-    report.skipped.push(format!("everything: {why}"));
-    report.error_reached = true;
-    BakeOutput::default()
+    Ok((BakedScene { objects, maps, volume, report }, samples))
 }
 
 impl Request<'_> {
@@ -320,13 +300,11 @@ impl Request<'_> {
         &self,
         input: &StaticScene,
         monitor: &mut BakeMonitor<'_>,
-        report: &mut BakeReport,
     ) -> Result<Reuse<'_>, BakeError> {
-        let hashes = monitor.run_interruptible(0.0, || hashes_of(input, self.options))?;
-        report.content_hash = hashes.content.to_string();
+        let hashes = monitor.run_interruptible(0.0, || hashes_of(input, &self.options))?;
         // Samples take memory. If that is limited, fewer patches may fit beside them, and the light would differ.
         let limited = self.options.memory.is_some() && self.sample_bytes(self.former.is_some()) > 0;
-        let reuse = Reuse::new(self.former, hashes, limited, input, self.options, report);
+        let reuse = Reuse::new(self.former, hashes, limited, input, &self.options);
         if let Some(checkpoint) = self.checkpoint {
             let opened = CheckpointFile::open(checkpoint, &reuse.identity);
             monitor.checkpoint =

@@ -1,10 +1,10 @@
-//! The result of a bake as plain data: maps, meshes with the coordinates to read them by, probes, report and samples.
+//! The result of a bake as plain data: maps, meshes with the coordinates to read them by, probes and report.
 //! Not how maps are made of texels: that is `finish`; nor how they get into a World: that is `apply`.
 
 use lumbre_scene::{IrradianceVolume, Transform};
 
-use crate::finish::baked_maps::{BakedMap, BakedObject};
-use crate::{BakeReport, Samples};
+use crate::BakeReport;
+use crate::finish::{BakedMap, BakedObject};
 
 /// What a bake has made of a [`StaticScene`](crate::StaticScene).
 #[derive(Debug)]
@@ -18,7 +18,13 @@ pub struct BakedScene {
     pub volume: Option<(Transform, IrradianceVolume)>,
     /// What was done, what it cost, and how accurate the result is.
     pub report: BakeReport,
-    /// The samples for [`Bake::former`](crate::Bake::former) of the next bake, if they were requested and there was
-    /// something to keep.
-    pub samples: Option<Samples>,
+}
+
+impl BakedScene {
+    /// Of a scene that has nothing to bake.
+    pub(crate) fn dark(why: &str, mut report: BakeReport) -> Self {
+        report.skipped.push(format!("everything: {why}"));
+        report.error_reached = true;
+        Self { objects: Vec::new(), maps: Vec::new(), volume: None, report }
+    }
 }

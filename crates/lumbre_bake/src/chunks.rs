@@ -18,9 +18,6 @@ const MIN_SIZE: usize = 64;
 const MAX_SIZE: usize = 1 << 16;
 
 /// Computes `count` values, one per index, in order.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn in_chunks<T: Send + Record>(
     count: usize,
     monitor: &mut BakeMonitor<'_>,
@@ -30,9 +27,6 @@ pub(crate) fn in_chunks<T: Send + Record>(
 }
 
 /// As [`in_chunks`], but stops when the time is up and then returns the values of the first indices only.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn in_chunks_until_deadline<T: Send + Record>(
     count: usize,
     monitor: &mut BakeMonitor<'_>,
@@ -42,9 +36,6 @@ pub(crate) fn in_chunks_until_deadline<T: Send + Record>(
 }
 
 /// A decision that depends on the clock. The checkpoint keeps it, so that a resumed bake decides the same.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn decide<T: Copy + Send + Sync + Record>(
     monitor: &mut BakeMonitor<'_>,
     decision: T,
@@ -53,9 +44,6 @@ pub(crate) fn decide<T: Copy + Send + Sync + Record>(
 }
 
 /// As [`in_chunks`], but without the checkpoint: for lists that are quick to compute again.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn in_chunks_uncheckpointed<T: Send>(
     count: usize,
     monitor: &mut BakeMonitor<'_>,

@@ -2,7 +2,9 @@
 //! its objects have changed, and they keep a checkpoint from being resumed by another bake. What the result does not
 //! depend on is left out, such as cameras, specular reflection and the number of threads.
 //!
-//! Structures are destructured without `..`, so that whoever adds a field has to decide here whether the bake reads it.
+//! Options, lights and materials are hashed as their debugging text, in which every number can be read back exactly, with
+//! what does not matter set to a default: a field that is added to them counts until it is set to a default here. Other
+//! structures are destructured without `..`, so that whoever adds a field has to decide here whether the bake reads it.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -11,12 +13,13 @@ use std::sync::Arc;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{AlphaMode, Attenuation, Light, Material, SpotCone, Surface};
+use lumbre_optics::{AlphaMode, Light, Material, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 use serde::{Deserialize, Serialize};
 
+use crate::bounds::Bounds;
 use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, from_world};
-use crate::{BakeError, BakeOptions, Density};
+use crate::{BakeError, BakeOptions};
 
 /// The version of the baker: that of the crate, and a hash of its sources and of the crates that influence a baked
 /// file.
@@ -80,18 +83,16 @@ pub(crate) struct Hashes {
 pub(crate) fn hashes_of(input: &StaticScene, options: &BakeOptions) -> Hashes {
     // Moving objects are hashed below, and only if probes are baked.
     let StaticScene { objects, lights, sky, moving: _ } = input;
+    // The result does not depend on the number of threads, nor on the time limit unless it cuts the bake short.
+    // `resolution_error` does not change the map, but the report, which is stored with the map.
+    let options = BakeOptions { threads: None, time: None, ..*options };
     let mut images = Images::default();
     let object_hashes: Vec<ContentHash> =
         objects.iter().map(|object| object_hash(object, &mut images)).collect();
     let light_hashes: Vec<ContentHash> = lights.iter().map(light_hash).collect();
-    let mut hasher = Hasher::new("lights");
-    hasher.hashes(&light_hashes);
-    hasher.color(sky);
-    let all_lights = hasher.finish();
-    let mut hasher = Hasher::new("sampling");
     // Options that do not influence samples are set to their defaults.
     let default = BakeOptions::default();
-    hasher.options(&BakeOptions {
+    let sampling = BakeOptions {
         atlas_size: default.atlas_size,
         seams: default.seams,
         resolution_error: default.resolution_error,
@@ -99,40 +100,34 @@ pub(crate) fn hashes_of(input: &StaticScene, options: &BakeOptions) -> Hashes {
         probe_spacing: default.probe_spacing,
         separate_light: default.separate_light,
         memory: default.memory,
-        ..*options
-    });
-    let sampling = hasher.finish();
-    let mut hasher = Hasher::new("lumbre bake");
-    hasher.options(options);
-    hasher.number(objects.len() as u64);
-    for hash in &object_hashes {
-        hasher.hashes(&[*hash]);
-    }
+        ..options
+    };
     // Which objects share a mesh is hashed, because they also share its unwrap.
-    let mut mesh_numbers: HashMap<*const TriangleMesh, u64> = HashMap::new();
-    for primitive in input.primitives() {
-        let next = mesh_numbers.len() as u64;
-        hasher.number(*mesh_numbers.entry(Arc::as_ptr(&primitive.mesh)).or_insert(next));
-    }
-    hasher.hashes(&light_hashes);
-    hasher.color(sky);
-    let probes = input.calls_for_probes(options).is_ok();
-    hasher.number(probes.into());
-    if probes {
+    let mut numbers: HashMap<*const TriangleMesh, usize> = HashMap::new();
+    let mut number = |primitive: &PlacedPrimitive| {
+        let next = numbers.len();
+        *numbers.entry(Arc::as_ptr(&primitive.mesh)).or_insert(next)
+    };
+    let meshes: Vec<usize> = input.primitives().map(&mut number).collect();
+    let probes = input.calls_for_probes(&options).is_ok().then(|| {
         // The box around moving objects determines the grid of probes.
-        let (low, high) = bounds(input.moving_points());
-        hasher.doubles(&[low.to_array(), high.to_array()].concat());
-        hasher.number(input.primitives().count() as u64);
-        input.primitives().for_each(|primitive| hasher.number(primitive.lights_frames.into()));
+        let finite = input.moving_points().iter().copied().filter(|point| point.is_finite());
+        let lights_frames = input.primitives().map(|primitive| primitive.lights_frames);
+        (finite.collect::<Bounds<DVec3>>(), lights_frames.collect::<Vec<bool>>())
+    });
+    Hashes {
+        content: Hasher::new("lumbre bake").text(&(
+            options,
+            &object_hashes,
+            meshes,
+            &light_hashes,
+            sky,
+            probes,
+        )),
+        objects: object_hashes,
+        lights: Hasher::new("lights").text(&(&light_hashes, sky)),
+        sampling: Hasher::new("sampling").text(&sampling),
     }
-    Hashes { content: hasher.finish(), objects: object_hashes, lights: all_lights, sampling }
-}
-
-/// Lowest and highest corner of the points' bounding box; +∞ and -∞ if there are no points.
-fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
-    let finite = points.iter().filter(|point| point.is_finite());
-    finite
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point)))
 }
 
 /// The hash of an object, including its transform.
@@ -140,57 +135,47 @@ fn object_hash(object: &SceneObject, images: &mut Images) -> ContentHash {
     let mut hasher = Hasher::new("object");
     // The name counts because the object's map is named after it.
     let SceneObject { name, primitives, lightmap_scale } = object;
-    hasher.bytes(name.as_bytes());
-    hasher.doubles(&[*lightmap_scale]);
-    hasher.number(primitives.len() as u64);
     for primitive in primitives {
         // `lights_frames` concerns only the probes and is hashed with them.
         let PlacedPrimitive { mesh, material, textures, transform, lights_frames: _ } = primitive;
         hasher.mesh(mesh);
-        hasher.material(material);
-        hasher.textures(textures.as_ref().unwrap_or(&MaterialTextures::default()), images);
-        hasher.doubles(&transform.to_cols_array());
+        let textures = textures.as_ref().map(|textures| images.textures(textures));
+        hasher.text(&(baked_part(material), textures.unwrap_or_default(), transform));
     }
-    hasher.finish()
+    hasher.text(&(name, lightmap_scale, primitives.len()))
 }
 
 fn light_hash(placed: &PlacedLight) -> ContentHash {
     let PlacedLight { light, position, axis } = placed;
     // Disabled lights are not in the list. Specular and ambient terms and shadow maps are used only in real time.
-    let Light {
-        kind,
-        ambient: _,
-        diffuse,
-        specular: _,
-        attenuation,
-        spot,
-        enabled: _,
-        shadow: _,
-        bake,
-        radius,
-        angle,
-    } = light;
-    let Attenuation { constant, linear, quadratic, clamp, range } = *attenuation;
-    let mut hasher = Hasher::new("light");
-    hasher.number(*kind as u64);
-    hasher.number(*bake as u64);
-    hasher.color(diffuse);
-    hasher.floats(&[constant, linear, quadratic, range, *radius, *angle]);
-    hasher.number(clamp.into());
-    match *spot {
-        None => hasher.number(0),
-        Some(SpotCone::Exponent { cutoff, exponent }) => {
-            hasher.number(1);
-            hasher.floats(&[cutoff, exponent]);
-        }
-        Some(SpotCone::Smooth { inner, outer }) => {
-            hasher.number(2);
-            hasher.floats(&[inner, outer]);
-        }
+    let unused = Vec3::ZERO;
+    let baked = Light { ambient: unused, specular: unused, enabled: true, shadow: false, ..light.clone() };
+    Hasher::new("light").text(&(baked, position, axis))
+}
+
+/// What is baked of a material: diffuse reflection, emission and opacity, but not specular reflection, mirrors and
+/// refraction.
+fn baked_part(material: &Material) -> Material {
+    let unused = Material::default();
+    let surface = |surface: &Surface| Surface {
+        ambient: unused.front.ambient,
+        specular: unused.front.specular,
+        shininess: unused.front.shininess,
+        ..*surface
+    };
+    Material {
+        front: surface(&material.front),
+        back: material.back.as_ref().map(surface),
+        // Opaque materials ignore their alpha.
+        alpha: if material.alpha_mode == AlphaMode::Opaque { unused.alpha } else { material.alpha },
+        mirror: unused.mirror,
+        transmission: unused.transmission,
+        ior: unused.ior,
+        lobe: unused.lobe,
+        distribution: unused.distribution,
+        fresnel: unused.fresnel,
+        ..material.clone()
     }
-    hasher.doubles(&position.to_array());
-    hasher.doubles(&axis.to_array());
-    hasher.finish()
 }
 
 /// Hashes of images, each computed once however many textures use it.
@@ -198,134 +183,55 @@ fn light_hash(placed: &PlacedLight) -> ContentHash {
 struct Images(HashMap<*const Image, ContentHash>);
 
 impl Images {
-    fn hash(&mut self, image: &Arc<Image>) -> ContentHash {
-        *self.0.entry(Arc::as_ptr(image)).or_insert_with(|| {
+    /// What is baked of a material's textures: normal and occlusion maps are ignored, as a lightmap holds the light on
+    /// the geometric surface (docs/decisions.md says why).
+    fn textures(&mut self, textures: &MaterialTextures) -> [Option<String>; 3] {
+        let MaterialTextures { base_color, emissive, metallic_roughness, normal: _, occlusion: _ } = textures;
+        let metallic_roughness = metallic_roughness.as_ref().map(|metallic_roughness| {
+            let MetallicRoughnessTexture { texture, base_color, metallic, roughness: _, dielectric: _ } =
+                metallic_roughness;
+            format!("{} {base_color:?} {metallic:?}", self.texture(texture))
+        });
+        let [base_color, emissive] =
+            [base_color, emissive].map(|texture| texture.as_ref().map(|texture| self.texture(texture)));
+        [base_color, emissive, metallic_roughness]
+    }
+
+    /// Everything of a texture that counts; of its sampler only the wrap modes, since the baker always filters
+    /// bilinearly.
+    fn texture(&mut self, texture: &TextureReference) -> String {
+        let TextureReference { image, sampler, tex_coord, offset, rotation, scale } = texture;
+        let wraps = (sampler.wrap_u, sampler.wrap_v);
+        let hash = self.0.entry(Arc::as_ptr(image)).or_insert_with(|| {
             let Image { name: _, width, height, rgba } = &**image;
             let mut hasher = Hasher::new("image");
-            hasher.number((*width).into());
-            hasher.number((*height).into());
             hasher.bytes(rgba);
-            hasher.finish()
-        })
+            hasher.text(&(width, height))
+        });
+        format!("{hash} {wraps:?} {tex_coord} {offset:?} {rotation:?} {scale:?}")
     }
 }
 
-/// Writes values into a hash such that different inputs give different bytes: every list is preceded by its length,
-/// every option by whether it is present, every enum by the number of its variant.
+/// Writes values into a hash such that different inputs give different bytes: every list is preceded by its length.
 struct Hasher(blake3::Hasher);
 
 impl Hasher {
     /// A hasher of inputs of this kind, which also hashes the baker's version.
     fn new(kind: &str) -> Self {
         let mut hasher = Self(blake3::Hasher::new());
-        hasher.bytes(kind.as_bytes());
-        hasher.bytes(BAKER.as_bytes());
+        hasher.text(&(kind, BAKER));
         hasher
     }
 
-    fn finish(&self) -> ContentHash {
+    /// Adds the debugging text of a value, and returns the hash of everything so far.
+    fn text(&mut self, value: &impl fmt::Debug) -> ContentHash {
+        self.bytes(format!("{value:?}").as_bytes());
         ContentHash(*self.0.finalize().as_bytes())
     }
 
     fn bytes(&mut self, bytes: &[u8]) {
-        self.number(bytes.len() as u64);
+        self.0.update(&(bytes.len() as u64).to_le_bytes());
         self.0.update(bytes);
-    }
-
-    fn number(&mut self, value: u64) {
-        self.0.update(&value.to_le_bytes());
-    }
-
-    fn numbers<const N: usize>(&mut self, values: [u64; N]) {
-        values.into_iter().for_each(|value| self.number(value));
-    }
-
-    fn floats(&mut self, values: &[f32]) {
-        self.words(values.len(), values.iter().map(|value| value.to_le_bytes()));
-    }
-
-    fn doubles(&mut self, values: &[f64]) {
-        self.number(values.len() as u64);
-        values.iter().for_each(|value| self.number(value.to_bits()));
-    }
-
-    fn color(&mut self, color: &Vec3) {
-        self.floats(&color.to_array());
-    }
-
-    fn hashes(&mut self, hashes: &[ContentHash]) {
-        self.number(hashes.len() as u64);
-        hashes.iter().for_each(|hash| {
-            self.0.update(hash.bytes());
-        });
-    }
-
-    fn vectors<const N: usize>(&mut self, vectors: impl ExactSizeIterator<Item = [f32; N]>) {
-        self.words(vectors.len(), vectors.flatten().map(f32::to_le_bytes));
-    }
-
-    /// Whether there is a value, and if so, what `hash` writes of it.
-    fn option<T>(&mut self, value: Option<&T>, hash: impl FnOnce(&mut Self, &T)) {
-        self.number(value.is_some().into());
-        if let Some(value) = value {
-            hash(self, value);
-        }
-    }
-
-    /// A list of `count` items, each of one or more words. Words are collected into blocks, as BLAKE3 is fast only on
-    /// long inputs.
-    fn words(&mut self, count: usize, words: impl Iterator<Item = [u8; 4]>) {
-        self.number(count as u64);
-        let mut block = Vec::with_capacity(1 << 14);
-        for word in words {
-            block.extend_from_slice(&word);
-            if block.len() >= 1 << 14 {
-                self.0.update(&block);
-                block.clear();
-            }
-        }
-        self.0.update(&block);
-    }
-
-    fn options(&mut self, options: &BakeOptions) {
-        // The result does not depend on the number of threads, nor on the time limit unless it cuts the bake short.
-        let BakeOptions {
-            density,
-            atlas_size,
-            error,
-            time: _,
-            quality,
-            patch_texels,
-            gap,
-            seed,
-            threads: _,
-            form_factors,
-            solver,
-            denoise,
-            seams,
-            resolution_error,
-            probes,
-            probe_spacing,
-            separate_light,
-            memory,
-        } = *options;
-        match density {
-            Density::Automatic => self.number(0),
-            Density::TexelsPerMeter(density) => {
-                self.number(1);
-                self.doubles(&[density]);
-            }
-            Density::MapSize(side) => self.numbers([2, side.into()]),
-        }
-        self.doubles(&[error]);
-        self.number(quality as u64);
-        self.doubles(&[patch_texels.map_or(0.0, f64::from)]);
-        self.numbers([gap.into(), seed.into(), form_factors as u64, solver as u64, denoise.into()]);
-        self.numbers([memory.unwrap_or(u64::MAX), atlas_size.map_or(0, u64::from), seams.into()]);
-        // `resolution_error` does not change the map, but the report, which is stored with the map.
-        self.numbers([resolution_error.into(), probes as u64]);
-        self.doubles(&[probe_spacing.unwrap_or(0.0)]);
-        self.number(separate_light.into());
     }
 
     fn mesh(&mut self, mesh: &TriangleMesh) {
@@ -336,70 +242,15 @@ impl Hasher {
         self.vectors(uv0.iter().map(|v| v.to_array()));
         self.vectors(uv1.iter().map(|v| v.to_array()));
         self.vectors(colors.iter().map(|v| v.to_array()));
-        self.words(indices.len(), indices.iter().map(|index| index.to_le_bytes()));
+        self.words(indices.iter().map(|index| index.to_le_bytes()));
     }
 
-    fn material(&mut self, material: &Material) {
-        // Diffuse reflection, emission and opacity are baked; specular reflection, mirrors and refraction are not.
-        let Material {
-            front,
-            back,
-            alpha,
-            alpha_mode,
-            double_sided,
-            unlit,
-            mirror: _,
-            transmission: _,
-            ior: _,
-            lobe: _,
-            distribution: _,
-            fresnel: _,
-        } = material;
-        self.surface(front);
-        self.option(back.as_ref(), Self::surface);
-        match *alpha_mode {
-            // Opaque materials ignore their alpha.
-            AlphaMode::Opaque => self.number(0),
-            AlphaMode::Mask { cutoff } => {
-                self.number(1);
-                self.floats(&[*alpha, cutoff]);
-            }
-            AlphaMode::Blend => {
-                self.number(2);
-                self.floats(&[*alpha]);
-            }
-        }
-        self.numbers([(*double_sided).into(), (*unlit).into()]);
+    fn vectors<const N: usize>(&mut self, vectors: impl Iterator<Item = [f32; N]>) {
+        self.words(vectors.flatten().map(f32::to_le_bytes));
     }
 
-    fn surface(&mut self, surface: &Surface) {
-        let Surface { ambient: _, diffuse, specular: _, emission, shininess: _ } = surface;
-        self.color(diffuse);
-        self.color(emission);
-    }
-
-    fn textures(&mut self, textures: &MaterialTextures, images: &mut Images) {
-        // The bake ignores normal and occlusion maps, as a lightmap holds the light on the geometric surface:
-        // docs/decisions.md says why.
-        let MaterialTextures { base_color, emissive, metallic_roughness, normal: _, occlusion: _ } = textures;
-        for texture in [base_color, emissive] {
-            self.option(texture.as_ref(), |hasher, texture| hasher.texture(texture, images));
-        }
-        self.option(metallic_roughness.as_ref(), |hasher, metallic_roughness| {
-            let MetallicRoughnessTexture { texture, base_color, metallic, roughness: _, dielectric: _ } =
-                metallic_roughness;
-            hasher.texture(texture, images);
-            hasher.color(base_color);
-            hasher.floats(&[*metallic]);
-        });
-    }
-
-    fn texture(&mut self, texture: &TextureReference, images: &mut Images) {
-        let TextureReference { image, sampler, tex_coord, offset, rotation, scale } = texture;
-        let hash = images.hash(image);
-        self.hashes(&[hash]);
-        // The baker always filters bilinearly, so only the sampler's wrap modes count.
-        self.numbers([sampler.wrap_u as u64, sampler.wrap_v as u64, (*tex_coord).into()]);
-        self.floats(&[offset.x, offset.y, *rotation, scale.x, scale.y]);
+    /// A list of words, all at once, as BLAKE3 is fast only on long inputs.
+    fn words(&mut self, words: impl Iterator<Item = [u8; 4]>) {
+        self.bytes(&words.flatten().collect::<Vec<u8>>());
     }
 }

@@ -45,6 +45,7 @@
 mod apply;
 mod bake;
 mod baked_scene;
+mod bounds;
 mod cancel_token;
 mod checkpoint;
 mod chunks;

@@ -2,23 +2,21 @@
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_optics::{BakeMode, Light, LightKind, Material};
+use lumbre_optics::{Light, Material};
 use lumbre_scene::{DynamicObject, SceneSettings, StaticObject, hidden_entities};
+
+use crate::PlacedLight;
 
 /// Whether anything gives light that a bake takes: lamps, emission, a sky.
 pub fn has_light_to_bake(world: &mut World) -> bool {
     let bright = |color: Vec3| color.max_element() > 0.0;
-    let is_baked = |light: &Light| {
-        let kept = light.bake != BakeMode::Dynamic && light.kind != LightKind::Ambient;
-        light.enabled && kept && bright(light.diffuse)
-    };
     let emits = |material: &Material| {
         let back = material.back.as_ref().filter(|_| material.double_sided);
         !material.unlit && (bright(material.front.emission) || back.is_some_and(|back| bright(back.emission)))
     };
     let hidden = hidden_entities(world);
     world.get_resource::<SceneSettings>().is_some_and(|settings| bright(settings.sky))
-        || world.query::<&Light>().iter(world).any(is_baked)
+        || world.query::<&Light>().iter(world).any(PlacedLight::is_baked)
         || world
             .query_filtered::<(Entity, &Material), (With<StaticObject>, Without<DynamicObject>)>()
             .iter(world)

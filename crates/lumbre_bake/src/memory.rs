@@ -4,20 +4,17 @@
 
 use std::mem::size_of;
 
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Footprint, FootprintPoint, Texel};
-use crate::denoise::nearness::Nearness;
-use crate::denoise::replicates::Estimates;
+use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel};
 use crate::denoise::texel_rows::BESIDE_A_ROW;
+use crate::denoise::{Estimates, Nearness};
 use crate::error::mebibytes;
-use crate::final_gather::gather_sums::GatherSums;
-use crate::final_gather::texel_radiance::TexelRadiance;
-use crate::radiosity::exchange::Resolution;
-use crate::radiosity::patches::{Patch, Patches};
+use crate::final_gather::{GatherSums, TexelRadiance};
+use crate::radiosity::{Patch, Patches, Resolution};
 use crate::rebake::TexelSamples;
+use crate::report::StageNotes;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
-use crate::sources::direct::Direct;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::sources::Direct;
+use crate::{BakeError, BakeOptions};
 
 /// Per triangle of the scene: the triangle itself; while the hierarchy is built, its corners without and with an index,
 /// and two nodes of the binary tree; in the finished hierarchy, its lane of a block that may be half empty, and its
@@ -113,23 +110,21 @@ pub(crate) fn check_texels(
 }
 
 /// Chooses the resolution of the patches and form factors: that of the quality, or the finest that fits into memory.
-/// Writes the estimated memory into the report, and a warning if the resolution was reduced.
+/// Warns if it was reduced.
 ///
 /// # Errors
 /// [`BakeError::Memory`] if even the coarsest resolution does not fit.
 pub(crate) fn resolution(
-    scene: &BakeScene,
     texels: &CoveredTexels<'_>,
     sample_bytes: u64,
     options: &BakeOptions,
-    report: &mut BakeReport,
-) -> Result<Resolution, BakeError> {
+) -> Result<(Resolution, StageNotes), BakeError> {
     let effort = options.effort();
-    let CoveredTexels { layout, list: texels, contacts, side: texel_side, .. } = texels;
+    let CoveredTexels { scene, layout, list: texels, contacts, side: texel_side, .. } = texels;
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let requested_rays = effort.form_factor_rays(texels.len(), options.error);
-    let mut resolution = Resolution { patch_side: side, form_factor_rays: requested_rays };
+    let mut resolution = Resolution { patch_side: side, form_factor_rays: requested_rays, memory_bytes: 0 };
     let triangles = scene.triangles.len() as u64;
     let covered = texels.len() as u64;
     let footprint_points = texels.iter().map(|texel| match &texel.footprint {
@@ -145,7 +140,7 @@ pub(crate) fn resolution(
     loop {
         let needed =
             texel_bytes + triangles * TRIANGLE_BYTES + OTHER_BYTES + exchange_bytes(&resolution, patches);
-        report.memory_bytes = needed;
+        resolution.memory_bytes = needed;
         let Some(limit) = options.memory.filter(|&limit| needed > limit) else { break };
         if resolution.form_factor_rays > effort.form_factor_rays {
             // The rays that only a large level gets go first.
@@ -161,8 +156,9 @@ pub(crate) fn resolution(
         is_coarsest = fewer == patches && resolution.form_factor_rays == 0;
         patches = fewer;
     }
+    let mut notes = StageNotes::default();
     if resolution.patch_side > side {
-        report.warnings.push(format!(
+        notes.warnings.push(format!(
             "{patches} patches instead of {requested_patches}, and {} form factor rays instead of {requested_rays}, so that the bake stays within {}",
             resolution.form_factor_rays,
             mebibytes(options.memory.unwrap_or_default())
@@ -170,9 +166,9 @@ pub(crate) fn resolution(
     }
     tracing::info!(
         "this bake needs about {} at most: {covered} texels, {triangles} triangles, {patches} patches",
-        mebibytes(report.memory_bytes)
+        mebibytes(resolution.memory_bytes)
     );
-    Ok(resolution)
+    Ok((resolution, notes))
 }
 
 /// Bytes for the patches, their form factors and the sampling guide.

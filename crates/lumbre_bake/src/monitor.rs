@@ -3,14 +3,14 @@
 //! time are in `stage`; how a list is divided into chunks is in `chunks`.
 
 use std::ops::ControlFlow;
-use std::sync::{Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::cancel_token::CancelToken;
 use crate::checkpoint::checkpoint_file::ChunkKey;
 use crate::checkpoint::{CheckpointFile, Record};
-use crate::stage::Stage;
-use crate::{BakeError, BakeReport, StageTime};
+use crate::stage::{Stage, StageProfile};
+use crate::{BakeError, StageTime};
 
 /// The progress of a running bake, as passed to the callback of [`Bake::progress`](crate::Bake::progress).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +85,10 @@ pub(crate) struct BakeMonitor<'a> {
     clock: Clock,
     is_cut_short: bool,
     stage: Option<(Stage, Instant)>,
+    /// The time that each finished stage took, in order.
+    pub stages: Vec<StageTime>,
+    /// The time of those that cast rays.
+    pub casting_seconds: f64,
     /// Begin and end of the current pass, as fractions of the running stage.
     pass: (f32, f32),
     error: Option<f64>,
@@ -100,6 +104,8 @@ impl<'a> BakeMonitor<'a> {
             callback,
             clock,
             stage: None,
+            stages: Vec::new(),
+            casting_seconds: 0.0,
             pass: (0.0, 1.0),
             error: None,
             is_cut_short: false,
@@ -135,7 +141,7 @@ impl<'a> BakeMonitor<'a> {
 
     /// A clock whose limit is the running stage's share of the time limit. It can be copied to other threads.
     pub fn clock(&self) -> Clock {
-        self.clock.until(self.running().share_of_limit())
+        self.clock.until(self.running().profile().share_of_limit)
     }
 
     /// Seconds that the bake has taken, including those of interrupted bakes that it resumes.
@@ -144,11 +150,8 @@ impl<'a> BakeMonitor<'a> {
     }
 
     /// Ends the running stage and begins `stage`.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
-    pub fn stage(&mut self, stage: Stage, report: &mut BakeReport) -> Result<(), BakeError> {
-        self.end_stage(report);
+    pub fn stage(&mut self, stage: Stage) -> Result<(), BakeError> {
+        self.end_stage();
         self.stage = Some((stage, Instant::now()));
         self.pass = (0.0, 1.0);
         self.advance(0.0)
@@ -162,19 +165,17 @@ impl<'a> BakeMonitor<'a> {
         self.pass = (begin, (begin + (1.0 - begin) * share).min(MAX_PASS_END));
     }
 
-    /// Writes the time of the running stage into the report.
-    pub fn end_stage(&mut self, report: &mut BakeReport) {
+    /// Ends the running stage, and notes the time that it took.
+    pub fn end_stage(&mut self) {
         if let Some((stage, begun)) = self.stage.take() {
-            report
-                .stages
-                .push(StageTime { stage: stage.name().to_owned(), seconds: begun.elapsed().as_secs_f64() });
+            let StageProfile { name, casts_rays, .. } = stage.profile();
+            let (stage, seconds) = (name.to_owned(), begun.elapsed().as_secs_f64());
+            self.casting_seconds += if casts_rays { seconds } else { 0.0 };
+            self.stages.push(StageTime { stage, seconds });
         }
     }
 
     /// Reports that `stage_fraction` of the running stage, or of its current pass, is done.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn advance(&mut self, stage_fraction: f32) -> Result<(), BakeError> {
         let progress = self.progress(stage_fraction);
         if (self.callback)(progress).is_break() {
@@ -186,9 +187,6 @@ impl<'a> BakeMonitor<'a> {
     /// Runs `work` on this thread while another thread calls the progress callback regularly. If that cancels the bake,
     /// [`BakeMonitor::stop`] is set, which `work` should poll, and its result is discarded. `stage_fraction` is the
     /// progress of the running stage, or of its pass, at the beginning of `work`.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn run_interruptible<T>(
         &mut self,
         stage_fraction: f32,
@@ -218,63 +216,45 @@ impl<'a> BakeMonitor<'a> {
 
     /// As [`BakeMonitor::run_interruptible`], but for work that does not poll [`BakeMonitor::stop`]. It runs on a
     /// thread of its own, which is left to finish by itself if the bake is cancelled.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn run_detached<T: Send + 'static>(
         &mut self,
         stage_fraction: f32,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, BakeError> {
-        let (sender, receiver) = std::sync::mpsc::sync_channel(1);
-        // Shared with the thread instead of moved into it, so that the work can still be run here if the thread cannot
-        // be started.
-        let work = std::sync::Arc::new(Mutex::new(Some(work)));
-        let work_of_thread = std::sync::Arc::clone(&work);
-        let take = |from: &Mutex<Option<_>>| from.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let thread = std::thread::Builder::new().name("bake detached".into()).spawn(move || {
-            if let Some(work) = take(&work_of_thread) {
-                // After a cancellation nobody receives the result.
-                let _ = sender.send(work());
-            }
+        let done = Arc::new(DoneSignal::default());
+        let done_in_thread = Arc::clone(&done);
+        let spawned = std::thread::Builder::new().name("bake detached".into()).spawn(move || {
+            let _signal = SignalOnDrop(&done_in_thread);
+            work()
         });
-        let Ok(thread) = thread else {
-            return match take(&work) {
-                Some(work) => self.run_interruptible(stage_fraction, work),
-                None => self.cancelled(),
-            };
-        };
-        loop {
-            match receiver.recv_timeout(CALLBACK_INTERVAL) {
-                Ok(result) => {
-                    self.check_cancelled()?;
-                    return Ok(result);
-                }
-                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => self.advance(stage_fraction)?,
-                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => match thread.join() {
-                    Err(panic) => std::panic::resume_unwind(panic),
-                    // Unreachable: a thread that does not panic sends its result before it ends.
-                    Ok(()) => return self.cancelled(),
-                },
-            }
+        let thread = spawned.map_err(|error| BakeError::Threads { reason: error.to_string() })?;
+        while !done.wait(CALLBACK_INTERVAL) {
+            self.advance(stage_fraction)?;
         }
-    }
-
-    fn cancelled<T>(&mut self) -> Result<T, BakeError> {
-        self.checkpoint.flush();
-        Err(BakeError::Cancelled { stage: self.running().name() })
+        let result = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        self.check_cancelled()?;
+        Ok(result)
     }
 
     fn progress(&self, stage_fraction: f32) -> Progress {
         let stage = self.running();
         let (begin, end) = self.pass;
         let stage_fraction = begin + (end - begin) * stage_fraction.clamp(0.0, 1.0);
-        let fraction = stage.share_of_bake_before() + stage.share_of_bake() * stage_fraction;
-        Progress { stage: stage.name(), stage_fraction, fraction: fraction.min(1.0), error: self.error }
+        let fraction = stage.share_of_bake_before() + stage.profile().share_of_bake * stage_fraction;
+        Progress {
+            stage: stage.profile().name,
+            stage_fraction,
+            fraction: fraction.min(1.0),
+            error: self.error,
+        }
     }
 
     fn check_cancelled(&mut self) -> Result<(), BakeError> {
-        if self.stop.is_cancelled() { self.cancelled() } else { Ok(()) }
+        if self.stop.is_cancelled() {
+            self.checkpoint.flush();
+            return Err(BakeError::Cancelled { stage: self.running().profile().name });
+        }
+        Ok(())
     }
 
     /// The running stage; before any has begun, the first one.

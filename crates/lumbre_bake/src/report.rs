@@ -78,8 +78,8 @@ pub struct WorstPlace {
 impl std::fmt::Display for WorstPlace {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [x, y, z] = self.center;
-        let objects = self.objects.join(", ");
-        write!(f, "{:.2} % around ({x:.1}, {y:.1}, {z:.1}): {objects}", 100.0 * self.error)
+        let (error, objects) = (Percent(self.error), self.objects.join(", "));
+        write!(f, "{error} around ({x:.1}, {y:.1}, {z:.1}): {objects}")
     }
 }
 
@@ -269,13 +269,51 @@ pub struct BakeReport {
     pub skipped: Vec<String>,
 }
 
+/// What a stage reports besides its result and the figures of its own.
+#[derive(Debug, Default)]
+pub(crate) struct StageNotes {
+    /// Number of rays cast.
+    pub rays: u64,
+    /// As [`BakeReport::warnings`].
+    pub warnings: Vec<String>,
+    /// As [`BakeReport::skipped`].
+    pub skipped: Vec<String>,
+}
+
+impl StageNotes {
+    pub fn of_rays(rays: u64) -> Self {
+        Self { rays, ..Self::default() }
+    }
+
+    pub fn of_warnings(warnings: Vec<String>) -> Self {
+        Self { warnings, ..Self::default() }
+    }
+
+    pub fn of_skipped(what_and_why: impl Into<String>) -> Self {
+        Self { skipped: vec![what_and_why.into()], ..Self::default() }
+    }
+}
+
 impl BakeReport {
+    /// The result of a stage, whose notes are added to the report.
+    pub(crate) fn noted<T>(&mut self, (result, notes): (T, StageNotes)) -> T {
+        self.rays += notes.rays;
+        self.warnings.extend(notes.warnings);
+        self.skipped.extend(notes.skipped);
+        result
+    }
+
+    /// Mean irradiance, mean of the channels, W/m².
+    pub(crate) fn mean_of_channels(&self) -> f64 {
+        self.mean_irradiance.iter().sum::<f64>() / 3.0
+    }
+
     /// The sources of the estimated error in one line, without minor ones; `None` if there is no error.
     pub fn error_parts_in_words(&self) -> Option<String> {
         /// Parts with a smaller fraction of the squared error are minor.
         const MINOR: f64 = 0.05;
         let is_major = |part: &&ErrorPart| part.error.powi(2) >= MINOR * self.estimated_error.powi(2);
-        let describe = |part: &ErrorPart| format!("{} {:.2} %", part.what, 100.0 * part.error);
+        let describe = |part: &ErrorPart| format!("{} {}", part.what, Percent(part.error));
         let parts: Vec<String> = self.error_parts.iter().filter(is_major).map(describe).collect();
         (!parts.is_empty()).then(|| format!("made of {} (their squares add up)", parts.join(", ")))
     }
@@ -283,23 +321,14 @@ impl BakeReport {
 
 impl std::fmt::Display for BakeReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { maps, texels, hidden_texels, seconds, threads, rays, leaked_rays, ended, .. } = self;
+        let coverage = 100.0 * self.coverage;
         writeln!(
             f,
-            "{} maps, {} texels ({:.0} % covered, {} partly hidden) in {:.2} s on {} threads",
-            self.maps,
-            self.texels,
-            100.0 * self.coverage,
-            self.hidden_texels,
-            self.seconds,
-            self.threads
+            "{maps} maps, {texels} texels ({coverage:.0} % covered, {hidden_texels} partly hidden) in {seconds:.2} s on {threads} threads"
         )?;
-        writeln!(
-            f,
-            "estimated error {:.2} % of the light around, {:.2} % of the level's mean: {}",
-            100.0 * self.estimated_error,
-            100.0 * self.error_of_mean,
-            self.ended
-        )?;
+        let [error, of_mean] = [self.estimated_error, self.error_of_mean].map(Percent);
+        writeln!(f, "estimated error {error} of the light around, {of_mean} of the level's mean: {ended}")?;
         if let Some(parts) = self.error_parts_in_words() {
             writeln!(f, "  {parts}")?;
         }
@@ -308,41 +337,32 @@ impl std::fmt::Display for BakeReport {
         }
         if self.resolution.points > 0 {
             let ResolutionReport { points, error, standard_error } = self.resolution;
-            writeln!(
-                f,
-                "resolution error {:.2} % ± {:.2} %, by {points} points between texels",
-                100.0 * error,
-                100.0 * standard_error
-            )?;
+            let [error, standard_error] = [error, standard_error].map(Percent);
+            writeln!(f, "resolution error {error} ± {standard_error}, by {points} points between texels")?;
         }
+        let (speed, gathered) = (self.mega_rays_per_second, self.gather_rays);
         writeln!(
             f,
-            "{} rays ({:.2} million a second), {:.0} gathered per texel, {} leaked",
-            self.rays, self.mega_rays_per_second, self.gather_rays, self.leaked_rays
+            "{rays} rays ({speed:.2} million a second), {gathered:.0} gathered per texel, {leaked_rays} leaked"
         )?;
+        let Self { triangles, patches, form_factors, iterations, residual, energy_lost, .. } = self;
         writeln!(
             f,
-            "{} triangles, {} patches, {} form factors; {:?} iterations, residual {:.1e}, energy lost {:.1e}",
-            self.triangles, self.patches, self.form_factors, self.iterations, self.residual, self.energy_lost
+            "{triangles} triangles, {patches} patches, {form_factors} form factors; {iterations:?} iterations, residual {residual:.1e}, energy lost {energy_lost:.1e}"
         )?;
         if self.seams.edges > 0 {
+            let SeamReport { edges, jump_before, jump_after, mean_change, largest_change } = self.seams;
+            let [before, after, mean, most] =
+                [jump_before, jump_after, mean_change, largest_change].map(Percent);
             writeln!(
                 f,
-                "{} seams: jump {:.2} % before, {:.2} % after; texels moved by {:.2} % on average, {:.2} % at most",
-                self.seams.edges,
-                100.0 * self.seams.jump_before,
-                100.0 * self.seams.jump_after,
-                100.0 * self.seams.mean_change,
-                100.0 * self.seams.largest_change
+                "{edges} seams: jump {before} before, {after} after; texels moved by {mean} on average, {most} at most"
             )?;
         }
         if self.probes.resolution != [0; 3] {
             let ProbeReport { resolution: [x, y, z], inside, estimated_error, .. } = self.probes;
-            writeln!(
-                f,
-                "{x} x {y} x {z} probes, {inside} inside geometry, error {:.2} %",
-                100.0 * estimated_error
-            )?;
+            let error = Percent(estimated_error);
+            writeln!(f, "{x} x {y} x {z} probes, {inside} inside geometry, error {error}")?;
         }
         if let Some(rebake) = &self.rebake {
             writeln!(f, "{rebake}")?;
@@ -350,8 +370,8 @@ impl std::fmt::Display for BakeReport {
         for ErrorAtTime { seconds, error } in &self.curve {
             writeln!(f, "  after {seconds:>8.3} s error {:.3} %", 100.0 * error)?;
         }
-        for stage in &self.stages {
-            writeln!(f, "  {:<14} {:>8.3} s", stage.stage, stage.seconds)?;
+        for StageTime { stage, seconds } in &self.stages {
+            writeln!(f, "  {stage:<14} {seconds:>8.3} s")?;
         }
         for line in &self.skipped {
             writeln!(f, "skipped {line}")?;
@@ -360,5 +380,14 @@ impl std::fmt::Display for BakeReport {
             writeln!(f, "warning: {line}")?;
         }
         Ok(())
+    }
+}
+
+/// A share, displayed in percent.
+struct Percent(f64);
+
+impl std::fmt::Display for Percent {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.2} %", 100.0 * self.0)
     }
 }

@@ -16,6 +16,19 @@ pub(crate) enum Stage {
     Seams,
 }
 
+/// What is known of a stage beforehand.
+pub(crate) struct StageProfile {
+    /// Its name in reports and progress.
+    pub name: &'static str,
+    /// Its usual share of the bake's time, in [0, 1].
+    pub share_of_bake: f32,
+    /// The share of the time limit after which it takes no more samples, so that time is left for a rough result of later
+    /// stages, in (0, 1].
+    pub share_of_limit: f64,
+    /// Whether most of its time is spent on casting rays.
+    pub casts_rays: bool,
+}
+
 impl Stage {
     pub const ALL: [Self; 10] = [
         Self::Layout,
@@ -30,60 +43,30 @@ impl Stage {
         Self::Seams,
     ];
 
-    /// Its name in reports and progress.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Layout => "layout",
-            Self::Hierarchy => "hierarchy",
-            Self::DirectLight => "direct light",
-            Self::FormFactors => "form factors",
-            Self::Radiosity => "radiosity",
-            Self::FinalGather => "final gather",
-            Self::Probes => "probes",
-            Self::Resolution => "resolution",
-            Self::Texels => "texels",
-            Self::Seams => "seams",
-        }
-    }
-
-    /// Its usual share of the bake's time, in [0, 1].
-    pub fn share_of_bake(self) -> f32 {
-        match self {
-            Self::Layout | Self::Texels => 0.03,
-            Self::Hierarchy | Self::Resolution | Self::Seams => 0.02,
-            Self::DirectLight => 0.2,
-            Self::FormFactors => 0.1,
-            Self::Radiosity | Self::Probes => 0.05,
-            Self::FinalGather => 0.48,
-        }
+    /// What is known of it beforehand.
+    pub fn profile(self) -> StageProfile {
+        let (name, share_of_bake, share_of_limit, casts_rays) = match self {
+            Self::Layout => ("layout", 0.03, 1.0, false),
+            Self::Hierarchy => ("hierarchy", 0.02, 1.0, false),
+            Self::DirectLight => ("direct light", 0.2, 0.38, true),
+            Self::FormFactors => ("form factors", 0.1, 0.52, true),
+            Self::Radiosity => ("radiosity", 0.05, 0.52, false),
+            Self::FinalGather => ("final gather", 0.48, 0.93, true),
+            Self::Probes => ("probes", 0.05, 0.95, true),
+            Self::Resolution => ("resolution", 0.02, 0.97, true),
+            Self::Texels => ("texels", 0.03, 1.0, false),
+            Self::Seams => ("seams", 0.02, 1.0, false),
+        };
+        StageProfile { name, share_of_bake, share_of_limit, casts_rays }
     }
 
     /// The usual share of the bake's time that the stages before it take, in [0, 1].
     pub fn share_of_bake_before(self) -> f32 {
-        Self::ALL.into_iter().take_while(|stage| *stage != self).map(Self::share_of_bake).sum()
-    }
-
-    /// The share of the time limit after which it takes no more samples, so that time is left for a rough result of later
-    /// stages, in (0, 1].
-    pub fn share_of_limit(self) -> f64 {
-        match self {
-            Self::Layout | Self::Hierarchy | Self::Texels | Self::Seams => 1.0,
-            Self::DirectLight => 0.38,
-            Self::FormFactors | Self::Radiosity => 0.52,
-            Self::FinalGather => 0.93,
-            Self::Probes => 0.95,
-            Self::Resolution => 0.97,
-        }
-    }
-
-    /// Whether most of its time is spent on casting rays.
-    pub fn casts_rays(self) -> bool {
-        match self {
-            Self::DirectLight | Self::FormFactors | Self::FinalGather | Self::Probes | Self::Resolution => {
-                true
-            }
-            Self::Layout | Self::Hierarchy | Self::Radiosity | Self::Texels | Self::Seams => false,
-        }
+        Self::ALL
+            .into_iter()
+            .take_while(|stage| *stage != self)
+            .map(|stage| stage.profile().share_of_bake)
+            .sum()
     }
 }
 
@@ -94,9 +77,9 @@ mod tests {
     #[test]
     fn every_stage_is_listed_once_and_they_take_the_whole_time() {
         for (place, stage) in Stage::ALL.into_iter().enumerate() {
-            assert_eq!(stage as usize, place, "{} is at its place in the list", stage.name());
+            assert_eq!(stage as usize, place, "{} is at its place in the list", stage.profile().name);
         }
         let last = Stage::ALL[Stage::ALL.len() - 1];
-        assert!((last.share_of_bake_before() + last.share_of_bake() - 1.0).abs() < 1e-6);
+        assert!((last.share_of_bake_before() + last.profile().share_of_bake - 1.0).abs() < 1e-6);
     }
 }

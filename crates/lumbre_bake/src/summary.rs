@@ -3,21 +3,21 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::coverage::footprint::Texel;
-use crate::final_gather::error_ledger::ErrorLedger;
-use crate::final_gather::lit_texels::LitTexels;
-use crate::final_gather::map_error::MapError;
+use crate::coverage::{CoveredTexels, Texel};
+use crate::final_gather::{ErrorLedger, GatherReport, LitTexels, MapError};
 use crate::finish::worst_places::worst_places;
 use crate::monitor::BakeMonitor;
+use crate::probes::PlacedVolume;
+use crate::radiosity::{ExchangeReport, Resolution};
 use crate::scene::SceneObject;
-use crate::stage::Stage;
-use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
+use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime, ProbeReport};
 
 /// Ends the last stage and writes the times and the checkpoint's warnings.
-pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> BakeReport {
-    monitor.end_stage(&mut report);
+pub(crate) fn finish(report: &mut BakeReport, monitor: &mut BakeMonitor<'_>) {
+    monitor.end_stage();
     // The caller may be interrupted while it saves the result, and would then resume from here.
     monitor.checkpoint.flush();
+    report.stages = std::mem::take(&mut monitor.stages);
     report.seconds = monitor.seconds();
     // Only now does a map with that error exist.
     if !report.curve.is_empty() {
@@ -25,42 +25,64 @@ pub(crate) fn finish(mut report: BakeReport, monitor: &mut BakeMonitor<'_>) -> B
     }
     report.resumed_seconds = monitor.checkpoint.resumed;
     report.warnings.append(&mut monitor.checkpoint.warnings);
-    let casting: Vec<&str> =
-        Stage::ALL.into_iter().filter(|stage| stage.casts_rays()).map(Stage::name).collect();
-    let casting = report.stages.iter().filter(|stage| casting.contains(&stage.stage.as_str()));
-    let casting: f64 = casting.map(|stage| stage.seconds).sum();
+    let casting = monitor.casting_seconds;
     report.mega_rays_per_second = if casting > 0.0 { report.rays as f64 * 1e-6 / casting } else { 0.0 };
-    report
 }
 
-/// Writes what is known once every texel has its light: the mean irradiance, the worst places and, if nothing bounces,
-/// the error.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
-pub(crate) fn write(
+/// Writes the figures of the single stages.
+pub(crate) fn write_stages(
     lit: &LitTexels<'_>,
-    bounces: bool,
+    resolution: &Resolution,
+    exchanged: ExchangeReport,
+    volume: Option<&PlacedVolume>,
+    report: &mut BakeReport,
+) {
+    let CoveredTexels { layout, list, hidden, .. } = lit.texels;
+    report.texels = layout.texels;
+    report.coverage = list.len() as f64 / layout.texels.max(1) as f64;
+    report.hidden_texels = *hidden;
+    report.memory_bytes = resolution.memory_bytes;
+    report.patches = exchanged.patches;
+    report.form_factors = exchanged.form_factors;
+    report.energy_lost = exchanged.energy_lost;
+    report.iterations = exchanged.iterations;
+    report.residual = exchanged.residual;
+    report.residual_bound = exchanged.residual_bound;
+    report.probes = volume.map_or_else(ProbeReport::default, |volume| volume.report);
+}
+
+/// Writes what is known once every texel has its light: the mean irradiance, the errors and the worst places.
+/// `gathered` is `None` where nothing bounces.
+pub(crate) fn write_errors(
+    lit: &LitTexels<'_>,
+    gathered: Option<GatherReport>,
     objects: &[SceneObject],
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
     report: &mut BakeReport,
 ) -> Result<(), BakeError> {
-    let LitTexels { scene, texels, direct, indirect, light } = *lit;
-    let (list, errors) = (&texels.list, &indirect.variances);
-    report.mean_irradiance = mean_irradiance(list, light).to_array();
-    if !bounces {
-        // Otherwise the rounds of the gather have written the error already.
-        let ledger = ErrorLedger::of_direct_light(direct);
-        let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
-        let error = MapError::new(&ledger, errors, list, &direct.local, mean);
-        error.write_report(options.error, ledger.parts(list, &direct.local), report);
-        report.ended = Ended::after(report.error_reached, monitor.is_late(), true);
-        report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
-    }
-    let (squared_errors, whole) = (direct.local.relative(&errors.expected), report.estimated_error);
-    report.worst =
-        monitor.run_interruptible(0.0, || worst_places(scene, objects, list, &squared_errors, whole))?;
+    let LitTexels { texels, direct, indirect, light } = *lit;
+    report.mean_irradiance = mean_irradiance(&texels.list, light).to_array();
+    let mean = report.mean_of_channels();
+    let gathered = gathered.unwrap_or_else(|| {
+        let ledger = ErrorLedger::of_direct_light(texels, direct);
+        let error = MapError::new(&ledger, &indirect.variances, mean);
+        let ended = Ended::after(error.relative <= options.error, monitor.is_late(), true);
+        let curve = vec![ErrorAtTime { seconds: monitor.seconds(), error: error.relative }];
+        GatherReport { error, curve, ended, leaked_rays: 0, gather_rays: 0.0 }
+    });
+    let error = gathered.error;
+    report.estimated_error = error.relative;
+    report.error_of_mean = error.of_mean;
+    report.error_reached = error.relative <= options.error;
+    report.error_parts = error.parts;
+    report.curve = gathered.curve;
+    report.ended = gathered.ended;
+    report.leaked_rays = gathered.leaked_rays;
+    report.gather_rays = gathered.gather_rays;
+    let squared_errors = direct.local.relative(&indirect.variances.expected);
+    let worst = || worst_places(texels.scene, objects, &texels.list, &squared_errors, error.relative);
+    report.worst = monitor.run_interruptible(0.0, worst)?;
     Ok(())
 }
 

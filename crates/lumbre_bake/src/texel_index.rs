@@ -3,7 +3,7 @@
 
 /// The index of a texel among those of all maps, map by map and row by row. Lists "per texel of all maps" are in this
 /// order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct MapTexel(pub u32);
 
 /// The index of a texel among the covered texels. Lists "of the covered texels" are in this order.
@@ -11,9 +11,6 @@ pub(crate) struct MapTexel(pub u32);
 pub(crate) struct CoveredTexel(pub u32);
 
 impl MapTexel {
-    /// No texel.
-    pub const NONE: Self = Self(u32::MAX);
-
     /// The index for a place in a list per texel of all maps, of which there are at most 2^26.
     pub fn new(place: usize) -> Self {
         Self(place as u32)

@@ -117,8 +117,9 @@ pub fn bake_world(
     former: Option<&Samples>,
     told: [f64; 2],
 ) -> Result<(Baked, Option<Samples>), CostError> {
-    let bake = Bake::new(options).former(former).progress(telling(conditions, told));
-    let (report, samples) = bake.run_keeping_samples(&mut world)?;
+    let mut samples = None;
+    let bake = Bake::new(options).former(former).keep_samples(&mut samples);
+    let report = bake.progress(telling(conditions, told)).run(&mut world)?;
     Ok((Baked { world, report }, samples))
 }
 

@@ -75,8 +75,11 @@ impl TriangleMesh {
 
     /// A mesh with the vertices `sources` of this one, including all attributes.
     ///
-    /// `sources` must be valid vertices of this mesh, and `indices` valid indices into `sources`.
-    pub(crate) fn with_vertices(&self, sources: &[u32], indices: Vec<u32>) -> Self {
+    /// `indices` must be valid indices into `sources`.
+    ///
+    /// # Panics
+    /// If `sources` contains a vertex that this mesh does not have.
+    pub fn with_vertices(&self, sources: &[u32], indices: Vec<u32>) -> Self {
         fn copy<T: Copy>(values: &[T], sources: &[u32]) -> Vec<T> {
             if values.is_empty() { Vec::new() } else { sources.iter().map(|&s| values[s as usize]).collect() }
         }

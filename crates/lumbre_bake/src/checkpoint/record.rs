@@ -29,9 +29,9 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::radiosity::patch_index::PatchIndex;
+    use crate::radiosity::PatchIndex;
     use crate::radiosity::ray_counts::PatchRayCounts;
-    use crate::sources::direct::{Direct, VisibilitySummary};
+    use crate::sources::{Direct, VisibilitySummary};
 
     #[test]
     fn what_is_written_is_read_to_the_last_bit() {

@@ -10,8 +10,9 @@ use super::contact_lines::ContactLines;
 use super::footprint::{Footprint, Texel};
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::texel_index::{CoveredTexel, MapTexel};
+use crate::visibility::PlaneFrame;
 use crate::visibility::clipping::clip_segment;
-use crate::visibility::contacts::{PlaneFrame, contacts};
+use crate::visibility::contacts::contacts;
 
 /// Length, in texels, below which a contact line does not divide a texel.
 const MIN_LENGTH: f64 = 0.25;
@@ -32,19 +33,16 @@ pub(crate) fn contact_lines(scene: &BakeScene, layout: &LightmapLayout) -> Conta
     ContactLines::new(lines)
 }
 
-/// Those of the crossed texels that their contact lines divide, in ascending order.
+/// Those of the crossed texels that their contact lines divide, in ascending order. `open_by_place` holds the texel at
+/// each place of the maps.
 pub(crate) fn divided_texels(
-    layout: &LightmapLayout,
     texels: &[Texel],
+    open_by_place: &[Option<CoveredTexel>],
     contacts: &ContactLines,
 ) -> Vec<CoveredTexel> {
-    let mut covered = vec![None; layout.texels];
-    for (place, texel) in texels.iter().enumerate() {
-        covered[texel.index.place()] = Some(CoveredTexel::new(place));
-    }
+    let crossed = contacts.iter().filter_map(|&(place, line)| Some((open_by_place[place.place()]?, line)));
     let mut divided: Vec<CoveredTexel> = Vec::new();
-    for &(index, line) in contacts.iter() {
-        let Some(texel) = covered[index.place()] else { continue };
+    for (texel, line) in crossed {
         if divided.last() != Some(&texel) && is_divided(&texels[texel.place()], line) {
             divided.push(texel);
         }

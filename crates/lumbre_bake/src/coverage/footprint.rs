@@ -4,10 +4,9 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::scene::Receiver;
-use crate::scene::material::Side;
-use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
+use crate::scene::{BakeScene, LightmapLayout, Receiver, SceneTriangle, Side};
 use crate::texel_index::{CoveredTexel, MapTexel};
+use crate::visibility::clipping::clip;
 
 /// A point on a triangle that a texel shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,21 +186,12 @@ pub(crate) fn barycentric(triangle: &SceneTriangle, position: Vec2) -> Option<(f
     (u.is_finite() && v.is_finite()).then_some((u, v))
 }
 
-/// The centroid, in the texel's unit square, of the part of a triangle in that square (Sutherland-Hodgman clipping).
+/// The centroid, in the texel's unit square, of the part of a triangle in that square.
 fn centroid_of_piece(triangle: &SceneTriangle, corner: Vec2) -> Option<Vec2> {
     let mut polygon: Vec<Vec2> = triangle.uv.iter().map(|&uv| uv - corner).collect();
     for (axis, sign, limit) in [(0, 1.0, 0.0), (0, -1.0, -1.0), (1, 1.0, 0.0), (1, -1.0, -1.0)] {
-        let height = |p: Vec2| sign * p[axis] - limit;
         let mut clipped = Vec::with_capacity(polygon.len() + 1);
-        for (i, &p) in polygon.iter().enumerate() {
-            let q = polygon[(i + 1) % polygon.len()];
-            if height(p) >= 0.0 {
-                clipped.push(p);
-            }
-            if (height(p) >= 0.0) != (height(q) >= 0.0) {
-                clipped.push(p.lerp(q, height(p) / (height(p) - height(q))));
-            }
-        }
+        clip(&polygon, |p: Vec2| sign * p[axis] - limit, |p| clipped.push(p));
         polygon = clipped;
     }
     let &first = polygon.first()?;

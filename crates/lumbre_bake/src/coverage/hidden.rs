@@ -51,9 +51,6 @@ const PASSES: [f32; 2] = [0.1, 0.2];
 
 /// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast.
 /// `contacts` divide the texels in `divided`.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn remove_hidden(
     scene: &BakeScene,
     layout: &LightmapLayout,

@@ -10,3 +10,9 @@ pub(crate) mod hidden;
 pub(crate) mod texel_geometry;
 pub(crate) mod texel_groups;
 pub(crate) mod tile_sequence;
+
+pub(crate) use contact_lines::ContactLines;
+pub(crate) use covered_texels::CoveredTexels;
+pub(crate) use footprint::{Footprint, FootprintPoint, GRID, MapAxes, Texel, barycentric, receiver};
+pub(crate) use texel_groups::TexelGroups;
+pub(crate) use tile_sequence::TileSequence;

@@ -1,11 +1,13 @@
 //! The geometry of what texels show: its points, whether it is flat, and a rectangle around it. Groups of texels are in
 //! `texel_groups`.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::footprint::{Footprint, Texel};
+use crate::bounds::Bounds;
 use crate::scene::BakeScene;
-use crate::visibility::shaft::{Area, contact};
+use crate::visibility::Area;
+use crate::visibility::shaft::contact;
 
 /// Appends points whose convex hull contains everything that a texel shows.
 pub(crate) fn positions_of(scene: &BakeScene, texel: &Texel, positions: &mut Vec<Vec3>) {
@@ -50,15 +52,17 @@ pub(crate) fn bounding_area(scene: &BakeScene, triangle: u32, positions: &[Vec3]
     let row = (q - p) * f64::from((c - a).y) - (r - p) * f64::from((b - a).y);
     let row = (row - normal * row.dot(normal)).try_normalize()?;
     let across = normal.cross(row);
-    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    // In the frame of these axes and the normal.
+    let mut bounds = Bounds::<DVec3>::default();
     for position in positions {
         let position = position.as_dvec3() - origin;
-        if position.dot(normal).abs() > contact(normal, f64::from(triangle.extent)) {
+        let height = position.dot(normal);
+        if height.abs() > contact(normal, f64::from(triangle.extent)) {
             return None;
         }
-        let flat = DVec2::new(position.dot(row), position.dot(across));
-        (low, high) = (low.min(flat), high.max(flat));
+        bounds.extend([DVec3::new(position.dot(row), position.dot(across), height)]);
     }
+    let Bounds { low, high } = bounds;
     let corner = |x: f64, y: f64| -> DVec3 { origin + row * x + across * y };
     let corners =
         [corner(low.x, low.y), corner(high.x, low.y), corner(high.x, high.y), corner(low.x, high.y)];

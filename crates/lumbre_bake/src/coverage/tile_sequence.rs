@@ -1,4 +1,4 @@
-//! Sample points that the texels of a tile share: each texel takes its own run of one sequence, in Morton order, so
+//! Sample points that the texels of a tile share: each texel takes its own section of one sequence, in Morton order, so
 //! that the points of every aligned 2 x 2, 4 x 4 and 8 x 8 block together are as evenly spread as those of one texel.
 //! The sums over neighbours that the denoiser takes then have the error of one long low-discrepancy sequence instead of
 //! many short independent ones (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via
@@ -19,19 +19,19 @@ pub(crate) struct TileSequence {
     first_set: SequenceSet,
     /// The texel's position in its tile, in Morton order.
     morton_index: u32,
-    /// Points in a texel's first run.
-    run: u32,
+    /// Points in a texel's first section.
+    first_section: u32,
 }
 
 impl TileSequence {
-    /// Every stream and tile has a scramble of its own. Each texel takes `run` points at first; each later run is as
-    /// long as all runs before it together.
-    pub fn new(seed: u32, stream: Stream, texel: &Texel, run: u32) -> Self {
+    /// Every stream and tile has a scramble of its own. Each texel takes `first_section` points at first; each
+    /// later section is as long as all sections before it together.
+    pub fn new(seed: u32, stream: Stream, texel: &Texel, first_section: u32) -> Self {
         // Maps are at most 8192 texels wide: 10 bits of tiles.
         let tile = ((texel.y / SIDE) << 10) | (texel.x / SIDE);
         let sequence = Sequence::new(seed, stream, tile).of(texel.object);
         let morton_index = morton(texel.x % SIDE, texel.y % SIDE);
-        Self { sequence, first_set: sequence.set(0), morton_index, run: run.max(1) }
+        Self { sequence, first_set: sequence.set(0), morton_index, first_section: first_section.max(1) }
     }
 
     /// The texel's point `sample` in dimension set 0.
@@ -44,15 +44,15 @@ impl TileSequence {
         self.sequence.point(self.index(sample), set)
     }
 
-    /// The index in the tile's sequence: first come the first runs of all texels, then their second runs, and so on.
+    /// The index in the tile's sequence: first come the first sections of all texels, then their second ones, and so on.
     fn index(&self, sample: u32) -> u32 {
         let mut before = 0;
-        let mut run = self.run;
-        while sample >= before + run {
-            before += run;
-            run = before;
+        let mut section = self.first_section;
+        while sample >= before + section {
+            before += section;
+            section = before;
         }
-        TEXELS * before + self.morton_index * run + (sample - before)
+        TEXELS * before + self.morton_index * section + (sample - before)
     }
 }
 

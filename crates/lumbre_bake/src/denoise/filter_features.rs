@@ -3,12 +3,12 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
+use super::filter_pass::Smoothed;
+use super::kernel::Kernel;
 use super::neighbours::Block;
 use super::plane::{REPLICATES_PER_HALF, VALUES, VALUES_PER_HALF};
+use super::replicates::REPLICATES;
 use super::texel_rows::{ChannelRows, lanes};
-use crate::denoise::filter_pass::Smoothed;
-use crate::denoise::kernel::Kernel;
-use crate::denoise::replicates::REPLICATES;
 
 /// The reach, in steps, over which the noise of texels is averaged.
 pub(crate) const NOISE_STEPS: usize = 2;

@@ -3,6 +3,7 @@
 
 pub(crate) mod box_sums;
 pub(crate) mod conserve_light;
+pub(crate) mod denoised;
 pub(crate) mod filter_features;
 pub(crate) mod filter_pass;
 pub(crate) mod kernel;
@@ -16,3 +17,8 @@ pub(crate) mod smoothing_bias;
 pub(crate) mod surface;
 pub(crate) mod texel_rows;
 pub(crate) mod weighted_fit;
+
+pub(crate) use denoised::Denoised;
+pub(crate) use nearness::Nearness;
+pub(crate) use neighbourhoods::Neighbourhoods;
+pub(crate) use replicates::{Estimates, REPLICATES};

@@ -6,7 +6,7 @@
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::coverage::footprint::MapAxes;
+use crate::coverage::MapAxes;
 
 /// The part of a surface's nearness that counts in every direction, even along the surface, because its own light may
 /// change. With 0.03 the texels at the joints of the Cornell box keep 1.3 times the noise, and with 0 hardly less than

@@ -8,41 +8,31 @@ use rayon::prelude::*;
 use super::box_sums::BoxSums;
 use super::surface::{NONE, Surface};
 use super::texel_rows::{ChannelRows, TexelRows};
-use crate::coverage::footprint::{MapAxes, Texel, open_texels};
-use crate::scene::{BakeScene, LightmapLayout};
+use crate::coverage::{CoveredTexels, MapAxes, Texel};
+use crate::texel_index::MapTexel;
 
 /// The neighbourhoods of all covered texels.
 pub(crate) struct Neighbourhoods<'a> {
-    scene: &'a BakeScene,
-    pub texels: &'a [Texel],
-    /// For each texel of all maps, its index among the covered ones; [`NONE`] if it is not covered, or hidden.
-    covered: Vec<u32>,
+    pub texels: &'a CoveredTexels<'a>,
     grid: TexelRows,
     /// For each covered texel, the number of its chart within its group; [`NONE`] for hidden ones.
     pub texel_charts: Vec<u32>,
     /// The first row of each map in the grid.
     first_rows: Vec<usize>,
-    /// The first texel of each row, as an index into all maps.
-    row_starts: Vec<usize>,
+    /// The first texel of each row.
+    row_starts: Vec<MapTexel>,
 }
 
 impl<'a> Neighbourhoods<'a> {
-    /// Texels of different `groups` are no neighbours of each other; an empty list puts all in one group. `charts`
-    /// holds the chart of each triangle.
-    pub fn new(
-        scene: &'a BakeScene,
-        layout: &LightmapLayout,
-        texels: &'a [Texel],
-        charts: &[u32],
-        groups: &[u32],
-    ) -> Self {
+    /// Texels of different `groups` are no neighbours of each other; an empty list puts all in one group.
+    pub fn new(texels: &'a CoveredTexels<'a>, groups: &[u32]) -> Self {
+        let CoveredTexels { scene, layout, charts, .. } = texels;
         let mut surfaces: Vec<Surface> = Vec::new();
         let mut numbers: HashMap<(u32, [u32; 3], u32), u32> = HashMap::new();
-        let mut covered = vec![NONE; layout.texels];
         let mut texel_surfaces = vec![NONE; layout.texels];
         let (mut chart_numbers, mut surface_charts) = (HashMap::new(), Vec::new());
-        let mut texel_charts = vec![NONE; texels.len()];
-        for (index, texel) in open_texels(texels) {
+        let mut texel_charts = vec![NONE; texels.list.len()];
+        for (index, texel) in texels.open() {
             let (chart, normal) =
                 (charts[texel.triangle as usize], scene.triangles[texel.triangle as usize].normal);
             let group = groups.get(index.place()).copied().unwrap_or(0);
@@ -54,7 +44,6 @@ impl<'a> Neighbourhoods<'a> {
                 surfaces.len() as u32 - 1
             });
             texel_charts[index.place()] = surface_charts[surface as usize];
-            covered[texel.index.place()] = index.0;
             texel_surfaces[texel.index.place()] = surface;
         }
         let sizes = layout.maps.iter().map(|map| (map.width, map.height));
@@ -63,14 +52,14 @@ impl<'a> Neighbourhoods<'a> {
         let (mut first_rows, mut row_starts) = (Vec::new(), Vec::new());
         for map in &layout.maps {
             first_rows.push(row_starts.len());
-            row_starts.extend((0..map.height as usize).map(|row| map.first + row * map.width as usize));
+            row_starts.extend((0..map.height).map(|row| map.texel(0, row)));
         }
-        Self { scene, texels, covered, grid, texel_charts, first_rows, row_starts }
+        Self { texels, grid, texel_charts, first_rows, row_starts }
     }
 
     /// How the map lies on a texel's surface.
     pub fn map_axes(&self, index: usize) -> MapAxes {
-        self.texels[index].map_axes(self.scene)
+        self.texels.list[index].map_axes(self.texels.scene)
     }
 
     /// The rows of all maps.
@@ -81,7 +70,10 @@ impl<'a> Neighbourhoods<'a> {
     /// Channels with the values of each covered texel that is not hidden; `value_of` takes its index among the covered
     /// ones.
     pub fn fill<const N: usize>(&self, value_of: impl Fn(usize) -> [f32; N] + Sync) -> ChannelRows<N> {
-        self.grid.fill(|row, column| value_of(self.covered[self.row_starts[row] + column] as usize))
+        self.grid.fill(|row, column| {
+            let place = MapTexel::new(self.row_starts[row].place() + column);
+            self.texels.open_at(place).map_or([0.0; N], |texel| value_of(texel.place()))
+        })
     }
 
     /// For each texel, the sums over neighbours of the same chart and about the same normal: those in every `step`th
@@ -102,6 +94,6 @@ impl<'a> Neighbourhoods<'a> {
             let row = self.first_rows[texel.object as usize] + texel.y as usize;
             if texel.is_hidden() { [0.0; N] } else { self.grid.get(channels, row, texel.x as usize) }
         };
-        self.texels.par_iter().map(value_of).collect()
+        self.texels.list.par_iter().map(value_of).collect()
     }
 }

@@ -4,8 +4,8 @@
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
 use super::neighbours::CENTER;
+use super::replicates::REPLICATES;
 use super::texel_rows::{WINDOW, lanes};
-use crate::denoise::replicates::REPLICATES;
 
 /// Replicates in a half.
 pub(crate) const REPLICATES_PER_HALF: usize = REPLICATES / 2;

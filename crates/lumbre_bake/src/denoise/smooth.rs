@@ -22,7 +22,7 @@ use super::replicates::Estimates;
 use super::smoothing_bias::{Products, squared_bias};
 use super::texel_rows::{ChannelRows, TexelRows};
 use super::weighted_fit::Fit;
-use crate::coverage::footprint::MapAxes;
+use crate::coverage::MapAxes;
 
 /// The first pass reaches a few texels, almost whatever is near. Its `bias_noise`: a replicate has four times the
 /// variance of the texel's mean, a block of 3 x 3 a ninth of that, and the radius of the bias holds 49 / 9 blocks,
@@ -33,25 +33,26 @@ const FIRST: FilterPass = FilterPass { width: 2.5, near: 1.0, guide_steps: 1, bi
 const SECOND: FilterPass = FilterPass { width: 9.0, near: 12.0, guide_steps: 0, bias_noise: 0.33 };
 
 /// The smoothed estimates of every covered texel, and the squared bias that smoothing may have brought, mean of the
-/// channels. `nearness` holds, per texel, the mean of that of the surfaces or lights that its samples reached.
+/// channels. `nearness` is, per texel, the mean of that of the surfaces or lights that its samples reached.
 pub(crate) fn smooth(
     neighbourhoods: &Neighbourhoods<'_>,
     estimates: &[Estimates],
-    nearness: &[Nearness],
+    nearness: impl Fn(usize) -> Nearness + Sync,
 ) -> (Vec<Estimates>, Vec<f32>) {
     let grid = neighbourhoods.grid();
     let nearness: ChannelRows<NEARNESS> =
-        neighbourhoods.fill(|index| nearness_channels(nearness[index], &neighbourhoods.map_axes(index)));
+        neighbourhoods.fill(|index| nearness_channels(nearness(index), &neighbourhoods.map_axes(index)));
     let mut smoothed: Smoothed = neighbourhoods.fill(|index| {
         let estimates = &estimates[index];
         std::array::from_fn(|place| if place < BIAS { estimates[place / 3][place % 3] } else { 0.0 })
     });
     smooth_rows(grid, nearness, &mut smoothed);
     let values = neighbourhoods.read(&smoothed).into_par_iter();
-    let results = values.zip(neighbourhoods.texels).zip(estimates).map(|((values, texel), estimates)| {
-        let smoothed = std::array::from_fn(|replicate| Vec3::from_slice(&values[3 * replicate..]));
-        if texel.is_hidden() { (*estimates, 0.0) } else { (smoothed, values[BIAS]) }
-    });
+    let results =
+        values.zip(&neighbourhoods.texels.list).zip(estimates).map(|((values, texel), estimates)| {
+            let smoothed = std::array::from_fn(|replicate| Vec3::from_slice(&values[3 * replicate..]));
+            if texel.is_hidden() { (*estimates, 0.0) } else { (smoothed, values[BIAS]) }
+        });
     let (mut smoothed, biases): (Vec<Estimates>, Vec<f32>) = results.unzip();
     conserve_light(&neighbourhoods.texel_charts, estimates, &mut smoothed);
     (smoothed, biases)

@@ -3,11 +3,11 @@
 use fearless_simd::{Simd, f32x8, prelude::*};
 
 use super::filter_features::center_values;
+use super::filter_pass::Smoothed;
+use super::kernel::Kernel;
 use super::neighbours::Block;
 use super::plane::{VALUES, VALUES_PER_HALF};
 use super::texel_rows::{ChannelRows, lanes};
-use crate::denoise::filter_pass::Smoothed;
-use crate::denoise::kernel::Kernel;
 
 /// Steps each way over which signed differences are averaged, and over which their products are averaged then.
 const BLOCK_RADIUS: usize = 1;

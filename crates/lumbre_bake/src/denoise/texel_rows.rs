@@ -7,8 +7,8 @@ use std::ops::Range;
 use fearless_simd::{Level, Simd, prelude::*};
 use rayon::prelude::*;
 
+use super::surface::{NONE, Surface};
 use crate::cancel_token::CancelToken;
-use crate::denoise::surface::{NONE, Surface};
 
 /// Texels that are computed side by side.
 pub(crate) const LANES: usize = 8;

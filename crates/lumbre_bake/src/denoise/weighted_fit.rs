@@ -4,11 +4,11 @@
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
 use super::filter_features::{FEATURES, NOISE, center_values};
+use super::filter_pass::{FilterPass, Smoothed};
+use super::kernel::Kernel;
 use super::neighbours::{Block, CENTER, NeighbourRow};
 use super::plane::{Planes, REPLICATES_PER_HALF, VALUES};
 use super::texel_rows::{ChannelRows, lanes};
-use crate::denoise::filter_pass::{FilterPass, Smoothed};
-use crate::denoise::kernel::Kernel;
 
 /// Squared differences of guides that amount to this many variances give a weight of e⁻¹.
 const GUIDE_VARIANCES: f32 = 8.0;

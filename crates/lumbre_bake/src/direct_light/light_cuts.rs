@@ -5,15 +5,13 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use crate::coverage::footprint::{Texel, receiver};
-use crate::coverage::texel_groups::TexelGroups;
+use crate::coverage::{CoveredTexels, TexelGroups, receiver};
 use crate::scene::Receiver;
-use crate::sources::light_cut::LightCut;
-use crate::sources::light_sources::Sources;
+use crate::sources::{LightCut, Sources};
 use crate::texel_index::CoveredTexel;
 
 /// Texels along a block's side.
-const BLOCK: u32 = 16;
+const BLOCK_SIDE: u32 = 16;
 
 /// The light cuts of all blocks.
 pub(crate) struct LightCuts {
@@ -21,13 +19,14 @@ pub(crate) struct LightCuts {
     /// For each block with texels in the open, a receiver in the middle of the block and the distance to the block's
     /// farthest point.
     anchors: Vec<Option<(Receiver, f32)>>,
-    blocks: TexelGroups,
+    pub blocks: TexelGroups,
 }
 
 impl LightCuts {
-    /// Cuts of all blocks; `charts` holds the chart of each triangle.
-    pub fn new(sources: &Sources<'_>, texels: &[Texel], charts: &[u32]) -> Self {
-        let blocks = TexelGroups::blocks(texels, charts, BLOCK);
+    /// Cuts of all blocks.
+    pub fn new(sources: &Sources<'_>, texels: &CoveredTexels<'_>) -> Self {
+        let blocks = TexelGroups::blocks(&texels.list, &texels.charts, BLOCK_SIDE);
+        let texels = &texels.list;
         let anchor = |members: &Vec<CoveredTexel>| {
             let middle_of = |member: &CoveredTexel| -> Option<Receiver> {
                 let texel = &texels[member.place()];

@@ -5,10 +5,9 @@ use glam::DVec3;
 use lumbre_optics::{LightKind, SpotCone};
 
 use crate::scene::{BakeScene, PlacedLight};
-use crate::sources::light_sources::Sources;
-use crate::visibility::cut_out::{Pieces, Shadow};
-use crate::visibility::shadow_clipping::{LightVisibility, Origin};
-use crate::visibility::shaft::{Area, Shaft, WIDEST};
+use crate::sources::Sources;
+use crate::visibility::shaft::WIDEST;
+use crate::visibility::{Area, LightVisibility, Origin, PolygonClipper, Shadow, Shaft};
 
 /// What is known about the visibility of some lights, in ascending order of their indices, from a flat area.
 /// `texel_side` is the side length of its texels. Lights that are left out need shadow rays.
@@ -113,7 +112,7 @@ fn visibility(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> Option<Li
     let corners = |&index: &u32| scene.triangles[index as usize].corners.map(|corner| corner.as_dvec3());
     let shadows: Vec<Shadow> =
         blockers.iter().map(corners).filter_map(|corners: [DVec3; 3]| origin.shadow(corners)).collect();
-    let mut scratch = Pieces::new();
+    let mut scratch = PolygonClipper::new();
     if shadows.is_empty() {
         Some(LightVisibility::Clear)
     } else if origin.hides_all(area.corners, &shadows, &mut scratch) {

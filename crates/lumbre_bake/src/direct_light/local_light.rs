@@ -11,21 +11,14 @@ use rayon::prelude::*;
 use crate::BakeError;
 use crate::chunks::{decide, in_chunks_uncheckpointed};
 use crate::color::channel_mean;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Texel, open_texels, receiver};
-use crate::coverage::texel_groups::TexelGroups;
+use crate::coverage::{CoveredTexels, TexelGroups, receiver};
 use crate::monitor::BakeMonitor;
 use crate::sampling::{Sequence, Stream, cosine_about};
-use crate::scene::Receiver;
-use crate::scene::material::Side;
-use crate::scene::{LightmapLayout, SurfaceHit};
-use crate::sources::direct::Direct;
-use crate::sources::light_sources::Sources;
+use crate::scene::{Receiver, Side, SurfaceHit};
+use crate::sources::{Direct, Sources};
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 
-/// Texels along the side of a block, all of which have the same local light.
-const BLOCK: u32 = 16;
 /// Walks from a block, the same once the time is up, and the most steps of a walk.
 const WALKS: u32 = 32;
 const LATE_WALKS: u32 = 4;
@@ -61,31 +54,21 @@ struct Walk {
 /// What walks need to know of the level.
 struct Walker<'a> {
     sources: &'a Sources<'a>,
-    layout: &'a LightmapLayout,
-    /// For each texel of all maps, its index among the covered ones; `None` if it is not covered, or hidden.
-    covered: Vec<Option<CoveredTexel>>,
+    texels: &'a CoveredTexels<'a>,
     blocks: &'a TexelGroups,
     direct: &'a [Direct],
 }
 
 impl LocalLight {
-    /// Estimates local light from the direct light that is known so far.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
+    /// Estimates local light, the same for all texels of a block, from the direct light that is known so far.
     pub fn new(
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
+        blocks: &TexelGroups,
         direct: &[Direct],
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
-        let CoveredTexels { layout, list: texels, charts, .. } = texels;
-        let blocks = TexelGroups::blocks(texels, charts, BLOCK);
-        let mut covered = vec![None; layout.texels];
-        for (place, texel) in open_texels(texels) {
-            covered[texel.index.place()] = Some(place);
-        }
-        let walker = Walker { sources, layout, covered, blocks: &blocks, direct };
+        let walker = Walker { sources, texels, blocks, direct };
         // Kept in the checkpoint, so that a bake which resumes there measures errors by the same light.
         let clock = monitor.clock();
         let is_late = decide(monitor, clock.is_over())?;
@@ -96,7 +79,7 @@ impl LocalLight {
                 true => LATE_WALKS,
                 false => WALKS,
             };
-            (0..walks).map(|walk| walker.walk(texels, members, block as u32, walk)).collect()
+            (0..walks).map(|walk| walker.walk(members, block as u32, walk)).collect()
         })?;
         let mean_of = |members: &Vec<CoveredTexel>, of: &dyn Fn(CoveredTexel) -> f32| {
             members.iter().map(|&member| f64::from(of(member))).sum::<f64>() / members.len().max(1) as f64
@@ -160,13 +143,13 @@ impl LocalLight {
 
 impl Walker<'_> {
     /// Walk `number` from a random point of a block.
-    fn walk(&self, texels: &[Texel], members: &[CoveredTexel], block: u32, number: u32) -> Walk {
+    fn walk(&self, members: &[CoveredTexel], block: u32, number: u32) -> Walk {
         let scene = self.sources.scene;
         let sequence = Sequence::new(SEED, Stream::LocalLight, block);
         let mut walk = Walk::default();
         let [choice, x, y, _] = sequence.point(number, 0);
         let member = members[((choice * members.len() as f32) as usize).min(members.len() - 1)];
-        let texel = &texels[member.place()];
+        let texel = &self.texels.list[member.place()];
         let Some(point) = texel.point(scene, x, y) else { return walk };
         let mut at: Receiver = receiver(scene, &point);
         let side = texel.side(scene);
@@ -202,7 +185,7 @@ impl Walker<'_> {
 
     /// The index of the covered texel at a point on a triangle's front.
     fn covered_texel_at(&self, triangle: u32, at: (f32, f32)) -> Option<CoveredTexel> {
-        let texel = self.layout.texel_at(&self.sources.scene.triangles[triangle as usize], at)?;
-        self.covered[texel.place()]
+        let triangle = &self.sources.scene.triangles[triangle as usize];
+        self.texels.open_at(self.texels.layout.texel_at(triangle, at)?)
     }
 }

@@ -9,16 +9,12 @@ use rayon::prelude::*;
 
 use super::light_cuts::LightCuts;
 use super::light_visibility::visibilities;
-use crate::coverage::footprint::{Footprint, FootprintPoint, GRID, Texel, barycentric};
 use crate::coverage::texel_geometry::{bounding_area, positions_of, shows_plane};
-use crate::coverage::texel_groups::TexelGroups;
+use crate::coverage::{Footprint, FootprintPoint, GRID, Texel, TexelGroups, barycentric};
 use crate::scene::BakeScene;
-use crate::sources::light_cut::LightCut;
-use crate::sources::light_sources::Sources;
+use crate::sources::{LightCut, Sources};
 use crate::texel_index::CoveredTexel;
-use crate::visibility::occluders::{LampOccluders, Visibility};
-use crate::visibility::shadow_clipping::{LightVisibility, ReceiverShape};
-use crate::visibility::shaft::{Area, Shaft};
+use crate::visibility::{Area, LampOccluders, LightVisibility, ReceiverShape, Shaft, Visibility};
 
 /// What may occlude the sources from a tile.
 #[derive(Default)]
@@ -50,12 +46,12 @@ pub(crate) struct Shafts<'a> {
 impl<'a> Shafts<'a> {
     /// Collects the occluders for all tiles of covered texels with a texel that is wanted.
     pub fn new(
-        scene: &'a BakeScene,
         sources: &'a Sources<'a>,
         texels: &[Texel],
         cuts: &LightCuts,
         wanted: impl Fn(CoveredTexel) -> bool + Sync,
     ) -> Self {
+        let scene = sources.scene;
         let mut shafts = Self { scene, sources, tiles: Vec::new(), tile_of: Vec::new() };
         if sources.emitters.is_empty() && sources.lights.is_empty() {
             return shafts;

@@ -10,19 +10,13 @@ use serde::{Deserialize, Serialize};
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
 use crate::chunks::{decide, in_chunks, in_chunks_until_deadline};
-use crate::coverage::footprint::{Texel, receiver};
-use crate::coverage::tile_sequence::TileSequence;
-use crate::denoise::nearness::Nearness;
-use crate::denoise::neighbourhoods::Neighbourhoods;
-use crate::denoise::replicates::{Estimates, REPLICATES, mean, spread};
-use crate::denoise::smooth::smooth;
+use crate::coverage::{Texel, TileSequence, receiver};
+use crate::denoise::replicates::mean;
+use crate::denoise::{Denoised, Estimates, Nearness, Neighbourhoods, REPLICATES};
 use crate::monitor::BakeMonitor;
-use crate::sample_allocation::{SampleAllocation, allocate_within};
+use crate::sample_allocation::{SampleAllocator, take_samples};
 use crate::sampling::{Stream, hash};
-use crate::sources::direct::Direct;
-use crate::sources::light_cut::SharedSources;
-use crate::sources::light_sources::Sources;
-use crate::squared_errors::SquaredErrors;
+use crate::sources::{Direct, Sources};
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions};
 
@@ -64,33 +58,6 @@ impl SampleSums {
     fn mean_nearness(&self) -> Nearness {
         Nearness::of_lamp(self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32)
     }
-
-    /// Adds samples until each replicate has `samples`; `run` is the first run's length of a [`TileSequence`].
-    fn add(
-        &mut self,
-        sources: &Sources<'_>,
-        shared: &SharedSources,
-        texel: &Texel,
-        run: u32,
-        samples: u32,
-        seed: u32,
-    ) {
-        for (replicate, sum) in self.sums.iter_mut().enumerate() {
-            let sequence = TileSequence::new(seed, Stream::SharedLight(replicate as u32), texel, run);
-            for sample in self.samples..samples {
-                let [x, y, ..] = sequence.first(sample);
-                let Some(point) = texel.point(sources.scene, x, y) else { continue };
-                let receiver = receiver(sources.scene, &point);
-                let [choice, u, v, _] = sequence.point(sample, 1);
-                let light = sources.sample(shared, &receiver, [choice, u, v]);
-                *sum += light.baked;
-                self.mixed += light.mixed;
-                self.inverse_distances += light.inverse_distance;
-                self.rays += u32::from(light.has_ray);
-            }
-        }
-        self.samples = self.samples.max(samples);
-    }
 }
 
 /// The sums of all texels, with what is needed to sample and smooth more.
@@ -106,22 +73,11 @@ pub(crate) struct SharedLight<'a> {
     /// Per covered texel.
     sums: Vec<SampleSums>,
     /// The smoothed light of `sums`; updated after every round.
-    smoothed: SmoothedLight,
-}
-
-/// Light whose noise has been smoothed over neighbours, and its errors.
-#[derive(Default)]
-struct SmoothedLight {
-    /// Per covered texel.
-    estimates: Vec<Estimates>,
-    variances: SquaredErrors,
+    smoothed: Denoised,
 }
 
 impl<'a> SharedLight<'a> {
     /// The first round: a few samples of every texel for whose index `is_wanted` holds.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn new(
         sources: &'a Sources<'a>,
         neighbourhoods: Neighbourhoods<'a>,
@@ -130,9 +86,9 @@ impl<'a> SharedLight<'a> {
         options: &'a BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
-        let texels = neighbourhoods.texels;
+        let texels = &neighbourhoods.texels.list;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
-        let (sums, smoothed) = (Vec::new(), SmoothedLight::default());
+        let (sums, smoothed) = (Vec::new(), Denoised::default());
         let mut light = Self { sources, texels, cuts, neighbourhoods, options, first, most, sums, smoothed };
         // A complete map comes first, whatever time it takes; if time is limited, with a single sample.
         let begun = monitor.seconds();
@@ -163,16 +119,24 @@ impl<'a> SharedLight<'a> {
     /// Adds samples to the sums of a texel until each replicate has `samples`.
     fn add(&self, place: usize, sums: &mut SampleSums, samples: u32) {
         let (texel, shared) = (&self.texels[place], &self.cuts.of(CoveredTexel::new(place)).shared);
-        if !texel.is_hidden() && !shared.is_empty() {
-            sums.add(
-                self.sources,
-                shared,
-                texel,
-                self.first,
-                samples,
-                hash(self.options.seed ^ Stream::SharedLight(0).number()),
-            );
+        if texel.is_hidden() || shared.is_empty() {
+            return;
         }
+        let (scene, seed) = (self.sources.scene, hash(self.options.seed ^ Stream::SharedLight(0).number()));
+        for (replicate, sum) in sums.sums.iter_mut().enumerate() {
+            let sequence = TileSequence::new(seed, Stream::SharedLight(replicate as u32), texel, self.first);
+            for sample in sums.samples..samples {
+                let [x, y, ..] = sequence.first(sample);
+                let Some(point) = texel.point(scene, x, y) else { continue };
+                let [choice, u, v, _] = sequence.point(sample, 1);
+                let light = self.sources.sample(shared, &receiver(scene, &point), [choice, u, v]);
+                *sum += light.baked;
+                sums.mixed += light.mixed;
+                sums.inverse_distances += light.inverse_distance;
+                sums.rays += u32::from(light.has_ray);
+            }
+        }
+        sums.samples = sums.samples.max(samples);
     }
 
     /// The light of individually sampled sources plus that of shared ones, without smoothing, as far as it is known.
@@ -186,25 +150,15 @@ impl<'a> SharedLight<'a> {
     }
 
     /// Smooths the samples, and estimates the errors of the result.
-    fn smooth(&self, monitor: &mut BakeMonitor<'_>) -> Result<SmoothedLight, BakeError> {
+    fn smooth(&self, monitor: &mut BakeMonitor<'_>) -> Result<Denoised, BakeError> {
         let raw: Vec<Estimates> = self.sums.par_iter().map(SampleSums::estimates).collect();
-        let (estimates, bias) = monitor.run_interruptible(1.0, || match self.options.denoise {
-            true => {
-                let nearness: Vec<Nearness> = self.sums.par_iter().map(SampleSums::mean_nearness).collect();
-                smooth(&self.neighbourhoods, &raw, &nearness)
-            }
-            false => (raw, vec![0.0; self.sums.len()]),
-        })?;
-        let spread = monitor.run_interruptible(1.0, || spread(&self.neighbourhoods, &estimates))?;
-        Ok(SmoothedLight { variances: spread.with(&bias), estimates })
+        let nearness = |place: usize| self.sums[place].mean_nearness();
+        Denoised::new(&self.neighbourhoods, &raw, nearness, self.options.denoise, monitor)
     }
 
     /// Takes more rounds. `goal` maps a share of the requested squared error to the sum over all texels of squared
     /// errors, relative to local light, that may then be left. `share` maps the samples per texel that the `least`
     /// share is expected to need to the share that is aimed at.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn refine(
         &mut self,
         local: &LocalLight,
@@ -214,31 +168,33 @@ impl<'a> SharedLight<'a> {
     ) -> Result<(), BakeError> {
         let (mut before, mut chosen_share) = (f64::INFINITY, None);
         loop {
-            let relative = local.relative_errors(&self.smoothed.variances);
+            let relative = local.relative_errors(&self.smoothed.errors());
             let is_sampled = |texel: &CoveredTexel| self.sums[texel.place()].samples > 0;
-            let sampled = CoveredTexel::all(self.texels.len()).filter(is_sampled);
+            let sampled: Vec<CoveredTexel> =
+                CoveredTexel::all(self.texels.len()).filter(is_sampled).collect();
             let summed =
-                |squares: &[f32]| sampled.clone().map(|texel| f64::from(squares[texel.place()])).sum::<f64>();
+                |squares: &[f32]| sampled.iter().map(|texel| f64::from(squares[texel.place()])).sum::<f64>();
             let left = summed(&relative.expected);
             let is_stalled = left > STALLED * before;
             let samples: Vec<u32> = self.sums.iter().map(|sums| sums.samples).collect();
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-            let count = sampled.clone().count() as u64;
+            let count = sampled.len() as u64;
             let budget = self.options.effort().budget(count) / REPLICATES as u64;
             let budget = budget.saturating_sub(taken);
             // Samples are allocated by the cautious errors, but the goal is for the expected ones: scale it.
             let caution = summed(&relative.cautious) / left;
-            let allocate = |goal: f64| -> Vec<SampleAllocation> {
-                let (sampled, errors) = (sampled.clone(), &relative.cautious);
-                allocate_within(budget, sampled, errors, &samples, self.most, ORDER, caution * goal)
+            let allocator = SampleAllocator {
+                texels: &sampled,
+                variances: &relative.cautious,
+                samples: &samples,
+                most: self.most,
+                order: ORDER,
             };
+            let allocate = |goal: f64| allocator.within(budget, caution * goal);
             // Before a round can reach the least share, a few uncertain texels dominate and the samples of the others
             // cannot be foreseen.
             if chosen_share.is_none() && left <= MAX_REDUCTION * goal(least) {
-                let more = |allocation: &SampleAllocation| {
-                    u64::from(allocation.samples - samples[allocation.texel.place()])
-                };
-                let foreseen = taken + allocate(goal(least)).iter().map(more).sum::<u64>();
+                let foreseen = taken + allocator.added(&allocate(goal(least)));
                 chosen_share = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
             }
             let goal = goal(chosen_share.unwrap_or(least));
@@ -248,17 +204,14 @@ impl<'a> SharedLight<'a> {
             before = left;
             let allocated = allocate(goal.max(left / MAX_REDUCTION));
             monitor.pass(PASS);
-            let more = in_chunks_until_deadline(allocated.len(), monitor, |index| {
-                let SampleAllocation { texel, samples } = allocated[index];
-                let mut sums = self.sums[texel.place()];
-                self.add(texel.place(), &mut sums, samples);
+            let mut sums = std::mem::take(&mut self.sums);
+            let taken = take_samples(&allocated, &mut sums, monitor, |to, mut sums| {
+                self.add(to.texel.place(), &mut sums, to.samples);
                 sums
             })?;
-            if more.is_empty() {
+            self.sums = sums;
+            if taken.is_empty() {
                 return Ok(());
-            }
-            for (allocation, sums) in allocated.iter().zip(more) {
-                self.sums[allocation.texel.place()] = sums;
             }
             self.smoothed = self.smooth(monitor)?;
         }
@@ -266,7 +219,7 @@ impl<'a> SharedLight<'a> {
 
     /// Adds the smoothed light to that of the individually sampled sources.
     pub fn add_to(self, direct: &mut [Direct]) {
-        let SmoothedLight { estimates, variances } = self.smoothed;
+        let (variances, Denoised { estimates, .. }) = (self.smoothed.errors(), self.smoothed);
         for (place, (direct, sums)) in direct.iter_mut().zip(&self.sums).enumerate() {
             if sums.samples > 0 {
                 let (estimates, variance) = (&estimates[place], variances.cautious[place]);

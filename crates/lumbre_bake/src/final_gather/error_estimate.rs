@@ -6,10 +6,10 @@ use crate::denoise::replicates::standard_error;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::coverage::footprint::Texel;
-use crate::denoise::neighbourhoods::Neighbourhoods;
-use crate::denoise::replicates::{Estimates, mean};
-use crate::final_gather::gather_sums::GatherSums;
+use super::gather_sums::GatherSums;
+use crate::coverage::Texel;
+use crate::denoise::replicates::mean;
+use crate::denoise::{Estimates, Neighbourhoods};
 
 /// Texels each way around a texel over which its neighbourhood's checks are pooled.
 const CHECK_RADIUS: usize = 3;

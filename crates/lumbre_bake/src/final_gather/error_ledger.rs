@@ -58,21 +58,17 @@ use crate::squared_errors::SquaredErrors;
 use rayon::prelude::*;
 
 use super::error_estimate::PatchBias;
+use super::gather_sums::GatherSums;
 use crate::ErrorPart;
-use crate::coverage::footprint::Texel;
-use crate::denoise::replicates::{Estimates, mean};
+use crate::coverage::{CoveredTexels, Texel};
+use crate::denoise::Denoised;
+use crate::denoise::replicates::mean;
 use crate::direct_light::DirectLight;
-use crate::direct_light::local_light::LocalLight;
-use crate::final_gather::gather_sums::GatherSums;
-use crate::sources::direct::Direct;
 
 /// The gather's results and errors, per covered texel.
 pub(crate) struct GatherErrors<'a> {
     pub gathered: &'a [GatherSums],
-    pub estimates: &'a [Estimates],
-    /// Variance of the mean of each texel's replicates.
-    pub noise: &'a SquaredErrors,
-    pub smoothing: &'a [f32],
+    pub denoised: &'a Denoised,
     pub patches: &'a [PatchBias],
     /// Bound of the solver's error, relative to the light by bounces.
     pub residual_bound: f64,
@@ -82,7 +78,8 @@ pub(crate) struct GatherErrors<'a> {
 
 /// What all terms of a map's error are computed from.
 pub(crate) struct ErrorLedger<'a> {
-    pub direct: &'a [Direct],
+    pub texels: &'a CoveredTexels<'a>,
+    pub direct: &'a DirectLight,
     /// `None` where nothing bounces.
     pub gather: Option<GatherErrors<'a>>,
     /// Mean irradiance, W/m²: the light that cracks may let through.
@@ -108,37 +105,24 @@ enum Term {
 const ARITHMETIC: f32 = 16.0 / (1 << 24) as f32;
 
 impl Term {
-    const ALL: [Self; 9] = [
-        Self::DirectLight,
-        Self::Noise,
-        Self::Smoothing,
-        Self::FormFactors,
-        Self::TexelsRead,
-        Self::Patches,
-        Self::Solver,
-        Self::ReusedGather,
-        Self::Arithmetic,
+    /// All terms, with their names in reports.
+    const ALL: [(Self, &'static str); 9] = [
+        (Self::DirectLight, "noise of direct light"),
+        (Self::Noise, "noise of the final gather"),
+        (Self::Smoothing, "smoothing"),
+        (Self::FormFactors, "form factors and patches' size"),
+        (Self::TexelsRead, "noise of texels that rays read"),
+        (Self::Patches, "patches beside real bounces"),
+        (Self::Solver, "solver"),
+        (Self::ReusedGather, "light kept of a former bake"),
+        (Self::Arithmetic, "arithmetic"),
     ];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::DirectLight => "noise of direct light",
-            Self::Noise => "noise of the final gather",
-            Self::Smoothing => "smoothing",
-            Self::FormFactors => "form factors and patches' size",
-            Self::TexelsRead => "noise of texels that rays read",
-            Self::Patches => "patches beside real bounces",
-            Self::Solver => "solver",
-            Self::ReusedGather => "light kept of a former bake",
-            Self::Arithmetic => "arithmetic",
-        }
-    }
 }
 
 impl<'a> ErrorLedger<'a> {
     /// The ledger of a map without bounces.
-    pub fn of_direct_light(direct: &'a DirectLight) -> Self {
-        Self { direct: &direct.texels, gather: None, light: 0.0 }
+    pub fn of_direct_light(texels: &'a CoveredTexels<'a>, direct: &'a DirectLight) -> Self {
+        Self { texels, direct, gather: None, light: 0.0 }
     }
 }
 
@@ -152,39 +136,34 @@ impl ErrorLedger<'_> {
                 [Term::Smoothing, Term::Solver, Term::Patches, Term::ReusedGather].map(stated);
             let systematic = smoothing + read + solver + patches + reused;
             let rest = stated(Term::DirectLight) + systematic + stated(Term::Arithmetic);
-            let expected = self.expected(Term::Noise, index) + (rest - self.direct[index].caution);
+            let expected = self.expected(Term::Noise, index) + (rest - self.direct.texels[index].caution);
             (stated(Term::Noise) + rest, expected)
         };
-        let (cautious, expected) = (0..self.direct.len()).into_par_iter().map(of_texel).unzip();
+        let (cautious, expected) = (0..self.direct.texels.len()).into_par_iter().map(of_texel).unzip();
         SquaredErrors { cautious, expected }
-    }
-
-    /// The part of each texel's error that more rays reduce.
-    pub fn by_rays(&self) -> SquaredErrors {
-        self.gather.as_ref().map_or_else(SquaredErrors::default, |gather| gather.noise.with(gather.smoothing))
     }
 
     /// By how much the sum over texels of the expected total, relative to the light around them, exceeds what is
     /// expected of the whole map: the patches' error of a single texel contains the effect of chance, which cancels in
     /// the mean of many.
-    pub fn by_chance(&self, texels: &[Texel], local: &LocalLight) -> f64 {
+    pub fn by_chance(&self) -> f64 {
         let Some(gather) = &self.gather else { return 0.0 };
         let sum_of = |square: fn(&PatchBias) -> f32| -> f64 {
             let squares: Vec<f32> = gather.patches.iter().map(square).collect();
-            open_sum(texels, &local.relative(&squares))
+            self.relative_sum(&squares)
         };
         sum_of(|bias| bias.rest) - sum_of(|bias| bias.expected).max(0.0)
     }
 
     /// What the map's error is made of, the largest part first: the parts' squares add up to that of the whole.
-    pub fn parts(&self, texels: &[Texel], local: &LocalLight) -> Vec<ErrorPart> {
-        let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
-        let by_chance = self.by_chance(texels, local);
-        let part = |term: Term| {
-            let squares: Vec<f32> = (0..texels.len()).map(|index| self.expected(term, index)).collect();
-            let sum = open_sum(texels, &local.relative(&squares));
+    pub fn parts(&self) -> Vec<ErrorPart> {
+        let (open, by_chance) = (self.open_texels(), self.by_chance());
+        let part = |(term, name): (Term, &str)| {
+            let all = 0..self.texels.list.len();
+            let squares: Vec<f32> = all.map(|index| self.expected(term, index)).collect();
+            let sum = self.relative_sum(&squares);
             let sum = if term == Term::Patches { sum - by_chance } else { sum };
-            ErrorPart { what: term.name().to_owned(), error: (sum / open).max(0.0).sqrt() }
+            ErrorPart { what: name.to_owned(), error: (sum / open).max(0.0).sqrt() }
         };
         let mut parts: Vec<ErrorPart> =
             Term::ALL.into_iter().map(part).filter(|part| part.error > 0.0).collect();
@@ -192,20 +171,31 @@ impl ErrorLedger<'_> {
         parts
     }
 
+    /// Number of texels that are not hidden; at least one, as it is divided by.
+    pub fn open_texels(&self) -> f64 {
+        self.texels.list.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64
+    }
+
+    /// The sum of squared errors over the texels that are not hidden, each relative to the light around its texel.
+    pub fn relative_sum(&self, squares: &[f32]) -> f64 {
+        open_sum(&self.texels.list, &self.direct.local.relative(squares))
+    }
+
     /// The squared error that is stated for a single texel.
     fn stated(&self, term: Term, index: usize) -> f32 {
         match (term, &self.gather) {
-            (Term::DirectLight, _) => self.direct[index].variance,
+            (Term::DirectLight, _) => self.direct.texels[index].variance,
             (Term::Arithmetic, _) => (ARITHMETIC * self.light).powi(2),
             (_, None) => 0.0,
-            (Term::Noise, Some(gather)) => gather.noise.cautious[index],
-            (Term::Smoothing, Some(gather)) => gather.smoothing[index],
+            (Term::Noise, Some(gather)) => gather.denoised.noise.cautious[index],
+            (Term::Smoothing, Some(gather)) => gather.denoised.smoothing[index],
             (Term::FormFactors, Some(gather)) => gather.gathered[index].patch_error().length_squared(),
             (Term::TexelsRead, Some(gather)) => gather.gathered[index].texel_variance(),
             (Term::Patches, Some(gather)) => gather.patches[index].rest,
             (Term::Solver, Some(gather)) => {
-                let unsolved =
-                    gather.residual_bound as f32 * mean(&gather.estimates[index]).element_sum() / 3.0;
+                let unsolved = gather.residual_bound as f32
+                    * mean(&gather.denoised.estimates[index]).element_sum()
+                    / 3.0;
                 unsolved * unsolved
             }
             (Term::ReusedGather, Some(gather)) => {
@@ -217,8 +207,8 @@ impl ErrorLedger<'_> {
     /// The squared error that is expected of a texel as one among many.
     fn expected(&self, term: Term, index: usize) -> f32 {
         match (term, &self.gather) {
-            (Term::DirectLight, _) => self.direct[index].variance - self.direct[index].caution,
-            (Term::Noise, Some(gather)) => gather.noise.expected[index],
+            (Term::DirectLight, _) => self.direct.texels[index].variance - self.direct.texels[index].caution,
+            (Term::Noise, Some(gather)) => gather.denoised.noise.expected[index],
             _ => self.stated(term, index),
         }
     }

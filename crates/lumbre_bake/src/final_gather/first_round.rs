@@ -10,19 +10,18 @@ use super::gather_sums::{GatherSums, UnguidedLight};
 use super::patch_fallback::{from_patches, knows_nothing};
 use super::radiance_cache::RadianceCache;
 use crate::chunks::decide;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::open_texels;
+use crate::coverage::CoveredTexels;
 use crate::denoise::replicates::{mean, variance};
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::SampleAllocation;
-use crate::texel_index::CoveredTexel;
+use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::{BakeError, BakeOptions};
 
 /// An evaluation takes about as much time as so many samples, per replicate, of every texel: 0.5 to 0.8 in the demo level,
 /// at sixteen and at 64 texels per metre.
 const SAMPLES_PER_EVALUATION: f64 = 0.8;
 /// The sides of the blocks in which one texel may stand for the others, in texels.
-const BLOCK: u32 = 2;
+const BLOCK_SIDE: u32 = 2;
 /// Estimated fraction of the stage's progress from now on that a round makes up.
 pub(crate) const ROUND_PROGRESS: f32 = 0.7;
 /// The same for a first sample of one texel of each block, and for that of the others.
@@ -30,9 +29,6 @@ const BLOCKS_PROGRESS: f32 = 0.1;
 
 /// Casts the `wanted` samples, which are the same number for each of their texels, or fewer if time is limited. Returns
 /// false if the time was up before the texels had as many as there seemed to be time for.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn cast_first_round(
     cache: &RadianceCache<'_>,
     texels: &CoveredTexels<'_>,
@@ -56,7 +52,7 @@ pub(crate) fn cast_first_round(
         one_each.partition(|allocation| representatives[allocation.texel.place()] == allocation.texel);
     // How many samples of every wanted texel there is time for, besides the evaluation that follows, which is one of all
     // texels.
-    let open = open_texels(list).count() as f64;
+    let open = texels.open().count() as f64;
     let samples_of_evaluation = SAMPLES_PER_EVALUATION * open / wanted.len() as f64;
     let samples_left = |cast: usize, monitor: &BakeMonitor<'_>| {
         let seconds = (monitor.seconds() - begun).max(1e-6) * wanted.len() as f64 / cast.max(1) as f64;
@@ -93,23 +89,18 @@ pub(crate) fn cast_first_round(
 /// For each texel, the first one of its block if both are open, of the same chart and not divided by a wall; otherwise
 /// the texel itself.
 fn representatives(texels: &CoveredTexels<'_>) -> Vec<CoveredTexel> {
-    let mut places = vec![None; texels.layout.texels];
-    for (place, texel) in open_texels(&texels.list) {
-        places[texel.index.place()] = Some(place);
-    }
-    for texel in &texels.divided {
-        places[texels.list[texel.place()].index.place()] = None;
-    }
+    let is_whole = |texel: &CoveredTexel| texels.divided.binary_search(texel).is_err();
+    let whole_at = |place: MapTexel| texels.open_at(place).filter(is_whole);
     let chart = |place: CoveredTexel| texels.charts[texels.list[place.place()].triangle as usize];
     CoveredTexel::all(texels.list.len())
         .map(|place| {
             let texel = &texels.list[place.place()];
-            if places[texel.index.place()].is_none() {
+            if whole_at(texel.index).is_none() {
                 return place;
             }
             let map = &texels.layout.maps[texel.object as usize];
-            let corner = map.texel(texel.x / BLOCK * BLOCK, texel.y / BLOCK * BLOCK);
-            places[corner.place()].filter(|&corner| chart(corner) == chart(place)).unwrap_or(place)
+            let corner = map.texel(texel.x / BLOCK_SIDE * BLOCK_SIDE, texel.y / BLOCK_SIDE * BLOCK_SIDE);
+            whole_at(corner).filter(|&corner| chart(corner) == chart(place)).unwrap_or(place)
         })
         .collect()
 }
@@ -128,7 +119,7 @@ fn copy_representatives(representatives: &[CoveredTexel], gathered: &mut [Gather
         let light = f64::from(mean(&estimates).element_sum()) / 3.0;
         let noise = f64::from(variance(&estimates).element_sum()) / 3.0;
         squared_light += light * light - noise;
-        if let Some((_, other, other_noise)) = before.filter(|(other, ..)| other.0 + BLOCK == place.0) {
+        if let Some((_, other, other_noise)) = before.filter(|(other, ..)| other.0 + BLOCK_SIDE == place.0) {
             squared_differences += (light - other).powi(2) - noise - other_noise;
         }
         before = Some((place, light, noise));
@@ -146,7 +137,7 @@ fn copy_representatives(representatives: &[CoveredTexel], gathered: &mut [Gather
                 checks: 0,
                 differences: Vec3::ZERO,
                 squared_differences: 0.0,
-                unguided: UnguidedLight::NONE,
+                unguided: UnguidedLight::default(),
                 ..sums
             };
         }
@@ -156,11 +147,11 @@ fn copy_representatives(representatives: &[CoveredTexel], gathered: &mut [Gather
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::denoise::replicates::REPLICATES;
+    use crate::denoise::REPLICATES;
 
     /// Of a texel whose four replicates have one sample each of this light.
     fn sums(light: f32) -> GatherSums {
-        let unguided = UnguidedLight { light, ..UnguidedLight::NONE };
+        let unguided = UnguidedLight { light, ..UnguidedLight::default() };
         let sums = [Vec3::splat(light); REPLICATES];
         GatherSums { sums, samples: 1, rays: 4, checks: 1, unguided, ..GatherSums::default() }
     }

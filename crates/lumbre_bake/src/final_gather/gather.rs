@@ -4,10 +4,9 @@
 //! so near a hit, the path makes another bounce instead. Emission is not read: `direct_light` has already counted it.
 //! Not where rays go and what they hit: that is `incident`.
 
+use super::gather_sums::{GatherSums, UnguidedLight};
 use crate::color::channel_mean;
-use crate::denoise::nearness::Nearness;
-use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::gather_sums::{GatherSums, UnguidedLight};
+use crate::denoise::{Nearness, REPLICATES};
 use std::cell::RefCell;
 
 use glam::{Vec2, Vec3};
@@ -15,15 +14,12 @@ use glam::{Vec2, Vec3};
 use super::incident::{GatherRequest, Hit, IncidentSample, SamplePath};
 use super::radiance_cache::RadianceCache;
 use crate::BakeError;
-use crate::chunks::in_chunks_until_deadline;
-use crate::coverage::footprint::{Texel, receiver};
-use crate::coverage::tile_sequence::TileSequence;
+use crate::coverage::{Texel, TileSequence, receiver};
 use crate::monitor::BakeMonitor;
-use crate::radiosity::patch_index::PatchIndex;
-use crate::sample_allocation::SampleAllocation;
+use crate::radiosity::PatchIndex;
+use crate::sample_allocation::{SampleAllocation, take_samples};
 use crate::sampling::{Sequence, Stream};
-use crate::scene::Receiver;
-use crate::scene::material::Side;
+use crate::scene::{Receiver, Side};
 
 /// One in this many samples also traces a real bounce, to check the patch that it reads.
 const CHECK_INTERVAL: u32 = 4;
@@ -36,49 +32,35 @@ const UNGUIDED: f32 = 0.9;
 const NEAR_BOUNCES: u32 = 6;
 
 /// Samples that are followed together, so that what they read is on its way from memory at the same time.
-const BATCH: usize = 16;
+const WAVEFRONT: usize = 16;
 
 /// Samples to follow, each with a tag that identifies it, and their results.
-struct Batch<Tag> {
-    requests: [GatherRequest; BATCH],
-    tags: [Tag; BATCH],
+#[derive(Default)]
+struct Wavefront<Tag> {
+    requests: [GatherRequest; WAVEFRONT],
+    tags: [Tag; WAVEFRONT],
     count: usize,
-    paths: [SamplePath; BATCH],
-    results: [IncidentSample; BATCH],
+    paths: [SamplePath; WAVEFRONT],
+    results: [IncidentSample; WAVEFRONT],
 }
 
-/// A batch of samples, and the batch of real bounces that check them.
-struct Batches {
+/// A wavefront of samples, and that of the real bounces that check them.
+#[derive(Default)]
+struct Wavefronts {
     /// Tagged with replicate and sample number.
-    samples: Batch<(usize, u32)>,
-    contributions: [GatherContribution; BATCH],
-    /// Tagged with the slot of the sample in its batch, and the patch that the sample read.
-    checks: Batch<(usize, PatchIndex)>,
+    samples: Wavefront<(usize, u32)>,
+    contributions: [GatherContribution; WAVEFRONT],
+    /// Tagged with the slot of the sample in its wavefront, and the patch that the sample read.
+    checks: Wavefront<(usize, PatchIndex)>,
 }
 
 thread_local! {
     /// Reused, since clearing them for every texel takes as long as some of its rays. Nothing reads what an earlier
-    /// batch left.
-    static BATCHES: RefCell<Batches> = const {
-        RefCell::new(Batches {
-            samples: Batch::empty((0, 0)),
-            contributions: [GatherContribution::NONE; BATCH],
-            checks: Batch::empty((0, PatchIndex(0))),
-        })
-    };
+    /// wavefront left.
+    static WAVEFRONTS: RefCell<Wavefronts> = RefCell::default();
 }
 
-impl<Tag: Copy> Batch<Tag> {
-    const fn empty(tag: Tag) -> Self {
-        Self {
-            requests: [GatherRequest::NOWHERE; BATCH],
-            tags: [tag; BATCH],
-            count: 0,
-            paths: [SamplePath::NONE; BATCH],
-            results: [IncidentSample::NOTHING; BATCH],
-        }
-    }
-
+impl<Tag: Copy> Wavefront<Tag> {
     fn push(&mut self, request: GatherRequest, tag: Tag) {
         self.requests[self.count] = request;
         self.tags[self.count] = tag;
@@ -91,7 +73,7 @@ impl<Tag: Copy> Batch<Tag> {
 }
 
 /// What one sample adds to a texel's sums.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct GatherContribution {
     light: Vec3,
     weight: f32,
@@ -109,24 +91,8 @@ struct GatherContribution {
     rays: u32,
 }
 
-impl GatherContribution {
-    const NONE: Self = Self {
-        light: Vec3::ZERO,
-        weight: 0.0,
-        error: Vec2::ZERO,
-        texel_variance: 0.0,
-        reads_texel: false,
-        is_checked: false,
-        difference: Vec3::ZERO,
-        rays: 0,
-    };
-}
-
 impl RadianceCache<'_> {
     /// Casts the wanted samples. Returns true if there was time for all of them.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn cast(
         &self,
         texels: &[Texel],
@@ -135,27 +101,21 @@ impl RadianceCache<'_> {
         seed: u32,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<bool, BakeError> {
-        let new_sums = in_chunks_until_deadline(wanted.len(), monitor, |place| {
-            let SampleAllocation { texel, samples } = wanted[place];
-            let mut sums = gathered[texel.place()];
-            self.gather(&texels[texel.place()], &mut sums, samples, seed);
+        let taken = take_samples(wanted, gathered, monitor, |to, mut sums| {
+            self.gather(&texels[to.texel.place()], &mut sums, to.samples, seed);
             sums
         })?;
-        let in_time = new_sums.len() == wanted.len();
-        for (allocated, sums) in wanted.iter().zip(new_sums) {
-            gathered[allocated.texel.place()] = sums;
-        }
-        Ok(in_time)
+        Ok(taken.len() == wanted.len())
     }
 
     /// Adds the samples `gathered.samples..samples` of every replicate.
     pub fn gather(&self, texel: &Texel, gathered: &mut GatherSums, samples: u32, seed: u32) {
-        BATCHES.with_borrow_mut(|batches| self.gather_with(batches, texel, gathered, samples, seed));
+        WAVEFRONTS.with_borrow_mut(|wavefronts| self.gather_with(wavefronts, texel, gathered, samples, seed));
     }
 
     fn gather_with(
         &self,
-        batches: &mut Batches,
+        wavefronts: &mut Wavefronts,
         texel: &Texel,
         gathered: &mut GatherSums,
         samples: u32,
@@ -167,30 +127,30 @@ impl RadianceCache<'_> {
         });
         let tags =
             (0..REPLICATES).flat_map(|replicate| (first..samples).map(move |sample| (replicate, sample)));
-        batches.samples.count = 0;
+        wavefronts.samples.count = 0;
         for (replicate, sample) in tags {
             let [x, y, u, v] = sequences[replicate].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
-                let patch = self.patches.at(point.triangle, Side::Front, point.at);
+                let patch = self.exchange.patches.at(point.triangle, Side::Front, point.at);
                 let region = patch.and_then(|patch| self.guide.region_of(patch));
                 let request = GatherRequest { receiver: receiver(self.scene, &point), region, u, v };
-                batches.samples.push(request, (replicate, sample));
+                wavefronts.samples.push(request, (replicate, sample));
             }
-            if batches.samples.count == BATCH {
-                self.gather_batch(texel, &sequences, seed, batches, gathered);
+            if wavefronts.samples.count == WAVEFRONT {
+                self.gather_wavefront(texel, &sequences, seed, wavefronts, gathered);
             }
         }
-        self.gather_batch(texel, &sequences, seed, batches, gathered);
+        self.gather_wavefront(texel, &sequences, seed, wavefronts, gathered);
         gathered.samples = first.max(samples);
     }
 
-    /// Follows the samples of a batch, adds what they find to the sums, and empties the batch.
-    fn gather_batch(
+    /// Follows the samples of a wavefront, adds what they find to the sums, and empties it.
+    fn gather_wavefront(
         &self,
         texel: &Texel,
         sequences: &[TileSequence; REPLICATES],
         seed: u32,
-        Batches { samples, contributions, checks }: &mut Batches,
+        Wavefronts { samples, contributions, checks }: &mut Wavefronts,
         gathered: &mut GatherSums,
     ) {
         samples.follow(self);
@@ -202,7 +162,7 @@ impl RadianceCache<'_> {
             *contribution = GatherContribution {
                 light: incident.light,
                 weight: incident.weight,
-                ..GatherContribution::NONE
+                ..GatherContribution::default()
             };
             let Some(hit) = &mut incident.hit else { continue };
             if hit.is_steep {
@@ -233,7 +193,7 @@ impl RadianceCache<'_> {
             let leaving = |hit: &Hit| incident.weight * hit.reflectance * (hit.direct + hit.indirect);
             let real_bounce = incident.hit.as_ref().map_or(incident.light, leaving);
             contributions[slot].rays += 1;
-            contributions[slot].difference *= self.patch_indirect[patch.place()] - real_bounce;
+            contributions[slot].difference *= self.exchange.indirect[patch.place()] - real_bounce;
         }
         for (slot, (contribution, &(replicate, _))) in contributions.iter().zip(tags).enumerate() {
             gathered.sums[replicate] += contribution.light;
@@ -275,8 +235,8 @@ impl RadianceCache<'_> {
         let mut receiver = *receiver;
         // In a gap narrower than patches a path may bounce many times.
         for bounce in 0..NEAR_BOUNCES {
-            let is_coarse =
-                last.variance.is_none() && last.distance < self.min_read_distance[last.patch.place()];
+            let is_coarse = last.variance.is_none()
+                && last.distance < self.exchange.min_read_distance[last.patch.place()];
             if !is_coarse || weight == Vec3::ZERO {
                 break;
             }
@@ -284,8 +244,8 @@ impl RadianceCache<'_> {
             contribution.rays += 1;
             receiver = self.receiver_at(&last);
             let request = GatherRequest { receiver, region: None, u, v };
-            let mut incident = [IncidentSample::NOTHING];
-            self.incident(&[request], &mut [SamplePath::NONE], &mut incident);
+            let mut incident = [IncidentSample::default()];
+            self.incident(&[request], &mut [SamplePath::default()], &mut incident);
             let [incident] = incident;
             let Some(hit) = incident.hit else {
                 contribution.light = light + weight * incident.light;

@@ -5,9 +5,8 @@ use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::color::channel_mean;
-use crate::denoise::nearness::Nearness;
-use crate::denoise::replicates::REPLICATES;
-use crate::radiosity::patch_index::PatchIndex;
+use crate::denoise::{Nearness, REPLICATES};
+use crate::radiosity::PatchIndex;
 
 /// Sums of the weights of a replicate's samples. The expected weight is 1, so the effect of a mean weight that differs
 /// from 1 can be removed from the estimate: the weight is a control variate, with its coefficient by regression (Owen
@@ -33,22 +32,12 @@ impl Weights {
 }
 
 /// The brightest light that a sample brought although the guide would hardly have led there.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct UnguidedLight {
     /// The patch that it came from.
     pub patch: PatchIndex,
     /// What it added to the sums, W/m², mean of the channels; 0 if there was none.
     pub light: f32,
-}
-
-impl UnguidedLight {
-    pub const NONE: Self = Self { patch: PatchIndex(0), light: 0.0 };
-}
-
-impl Default for UnguidedLight {
-    fn default() -> Self {
-        Self::NONE
-    }
 }
 
 /// What a texel has gathered: sums for its irradiance by bounces.

@@ -7,15 +7,13 @@ use std::f32::consts::FRAC_1_PI;
 use glam::{Vec2, Vec3};
 
 use super::radiance_cache::RadianceCache;
-use crate::radiosity::patch_index::PatchIndex;
-use crate::radiosity::sampling_guide::{GuidedPatch, Region, RowPart};
+use crate::radiosity::{GuidedPatch, PatchIndex, Region, RowPart};
 use crate::sampling::{cosine_about, triangle_point};
-use crate::scene::material::Side;
-use crate::scene::{Receiver, SurfaceHit};
+use crate::scene::{Receiver, Side, SurfaceHit};
 use crate::texel_index::MapTexel;
 
 /// A request for one sample of a receiver's light by bounces.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GatherRequest {
     pub receiver: Receiver,
     /// The receiver's region of the guide; without one, only cosine rays are cast.
@@ -25,23 +23,8 @@ pub(crate) struct GatherRequest {
     pub v: f32,
 }
 
-impl GatherRequest {
-    /// A placeholder for empty places of a batch.
-    pub const NOWHERE: Self = Self {
-        receiver: Receiver {
-            position: Vec3::ZERO,
-            origin: Vec3::ZERO,
-            geometric_normal: Vec3::Z,
-            normal: Vec3::Z,
-        },
-        region: None,
-        u: 0.0,
-        v: 0.0,
-    };
-}
-
-/// A surface that a sample has hit.
-#[derive(Clone, Copy, Debug)]
+/// A surface that a sample has hit. By default its light has not been read yet.
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Hit {
     pub triangle: u32,
     pub side: Side,
@@ -63,26 +46,8 @@ pub(crate) struct Hit {
     pub distance: f32,
 }
 
-impl Hit {
-    /// A hit whose light has not been read yet.
-    const UNREAD: Self = Self {
-        triangle: 0,
-        side: Side::Front,
-        at: (0.0, 0.0),
-        patch: PatchIndex(0),
-        reflectance: Vec3::ZERO,
-        direct: Vec3::ZERO,
-        indirect: Vec3::ZERO,
-        is_steep: false,
-        error: Vec2::ZERO,
-        variance: None,
-        direction: Vec3::ZERO,
-        distance: 0.0,
-    };
-}
-
-/// The result of a sample.
-#[derive(Clone, Copy, Debug)]
+/// The result of a sample; by default no light and no weight, as where the point that the guide proposed is not visible.
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct IncidentSample {
     /// The reflecting surface that was hit, if one was.
     pub hit: Option<Hit>,
@@ -92,13 +57,8 @@ pub(crate) struct IncidentSample {
     pub weight: f32,
 }
 
-impl IncidentSample {
-    /// No light and no weight: the point that the guide proposed is not visible.
-    pub const NOTHING: Self = Self { hit: None, light: Vec3::ZERO, weight: 0.0 };
-}
-
 /// Where a sample's ray goes.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(crate) enum SampleTarget {
     /// In a direction, cosine-distributed about the receiver's normal.
     Direction(Vec3),
@@ -106,30 +66,23 @@ pub(crate) enum SampleTarget {
     /// and the point just off its surface.
     Point(f32, Hit, Vec3),
     /// The guide's point cannot light the receiver.
+    #[default]
     Nowhere,
 }
 
 /// The state of a sample while it is followed.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct SamplePath {
     target: SampleTarget,
     /// The share of the samples that the guide places; `None` if it knows nothing of the receiver.
     guided_share: Option<f32>,
     /// Part of the guide's row that is searched next.
     row_part: RowPart,
-    /// The texel that was hit.
-    texel: MapTexel,
+    /// The texel that shows what was hit, if there is one.
+    texel: Option<MapTexel>,
 }
 
 impl SamplePath {
-    /// Not followed yet.
-    pub const NONE: Self = Self {
-        target: SampleTarget::Nowhere,
-        guided_share: None,
-        row_part: RowPart::NONE,
-        texel: MapTexel::NONE,
-    };
-
     /// The share of the samples that go in directions of a cosine distribution.
     pub fn cosine_share(&self) -> f32 {
         1.0 - self.guided_share.unwrap_or(0.0)
@@ -183,11 +136,11 @@ impl RadianceCache<'_> {
             self.follow(request, path, result);
         }
         for (path, result) in paths.iter_mut().zip(results.iter_mut()) {
-            path.texel = MapTexel::NONE;
+            path.texel = None;
             let Some(hit) = &mut result.hit else { continue };
             if let SampleTarget::Direction(_) = path.target {
-                let Some(patch) = self.patches.at(hit.triangle, hit.side, hit.at) else {
-                    *result = IncidentSample::NOTHING;
+                let Some(patch) = self.exchange.patches.at(hit.triangle, hit.side, hit.at) else {
+                    *result = IncidentSample::default();
                     continue;
                 };
                 hit.patch = patch;
@@ -209,8 +162,8 @@ impl RadianceCache<'_> {
                 hit.reflectance = self.reflectance_at(hit.triangle, hit.side, hit.at);
             }
             if hit.variance.is_none() {
-                hit.indirect = self.patch_indirect[hit.patch.place()];
-                hit.error = self.patch_error[hit.patch.place()];
+                hit.indirect = self.exchange.indirect[hit.patch.place()];
+                hit.error = self.exchange.indirect_error[hit.patch.place()];
             }
             if let (SampleTarget::Direction(_), Some(region), Some(_)) =
                 (&path.target, request.region, path.guided_share)
@@ -221,12 +174,12 @@ impl RadianceCache<'_> {
         for ((path, request), result) in paths.iter().zip(requests).zip(results) {
             let Some(hit) = &mut result.hit else { continue };
             if hit.direct.x.is_nan() {
-                hit.direct = self.patch_direct[hit.patch.place()];
+                hit.direct = self.exchange.direct[hit.patch.place()];
             }
             if let Some(share) = path.guided_share {
                 match self.weight(request, path, share, hit) {
                     Some(weight) => result.weight = weight,
-                    None => *result = IncidentSample::NOTHING,
+                    None => *result = IncidentSample::default(),
                 }
             }
         }
@@ -252,7 +205,7 @@ impl RadianceCache<'_> {
     /// Casts the sample's ray; the light of what it hits is not read yet.
     #[inline]
     fn follow(&self, request: &GatherRequest, path: &SamplePath, result: &mut IncidentSample) {
-        *result = IncidentSample::NOTHING;
+        *result = IncidentSample::default();
         let origin = request.receiver.origin;
         match &path.target {
             SampleTarget::Nowhere => {}
@@ -267,11 +220,11 @@ impl RadianceCache<'_> {
                 let cosine_share = path.cosine_share();
                 match self.scene.first_hit(origin, direction) {
                     SurfaceHit::Lit { triangle, side, at, distance } => {
-                        result.hit = Some(Hit { triangle, side, at, direction, distance, ..Hit::UNREAD });
+                        result.hit = Some(Hit { triangle, side, at, direction, distance, ..Hit::default() });
                         result.weight = 1.0;
                     }
                     SurfaceHit::None => {
-                        (result.light, result.weight) = (self.sky / cosine_share, 1.0 / cosine_share);
+                        (result.light, result.weight) = (self.sources.sky / cosine_share, 1.0 / cosine_share);
                     }
                     SurfaceHit::Back | SurfaceHit::Inside => result.weight = 1.0 / cosine_share,
                 }
@@ -299,9 +252,9 @@ impl RadianceCache<'_> {
     #[inline]
     fn point_of(&self, receiver: &Receiver, guided: GuidedPatch, v: f32) -> Option<SampleTarget> {
         let GuidedPatch { patch, u, density } = guided;
-        let chosen = &self.patches.list[patch.place()];
+        let chosen = &self.exchange.patches.list[patch.place()];
         let (triangle, side) = (chosen.triangle, chosen.side);
-        let at = self.patches.point(chosen, triangle_point(u, v));
+        let at = self.exchange.patches.point(chosen, triangle_point(u, v));
         let surface = &self.scene.triangles[triangle as usize];
         let position = surface.position(at.0, at.1);
         let offset = position - receiver.position;
@@ -313,7 +266,7 @@ impl RadianceCache<'_> {
             return None;
         }
         let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
-        let hit = Hit { triangle, side, at, patch, direction, distance, ..Hit::UNREAD };
+        let hit = Hit { triangle, side, at, patch, direction, distance, ..Hit::default() };
         Some(SampleTarget::Point(density, hit, end))
     }
 

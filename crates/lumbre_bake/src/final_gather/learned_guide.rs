@@ -11,10 +11,9 @@ use rayon::prelude::*;
 
 use super::gather_sums::{GatherSums, UnguidedLight};
 use super::radiance_cache::RadianceCache;
-use crate::coverage::footprint::Texel;
-use crate::radiosity::patch_index::PatchIndex;
-use crate::radiosity::sampling_guide::{Discovery, Region};
-use crate::scene::material::Side;
+use crate::coverage::Texel;
+use crate::radiosity::{Discovery, PatchIndex, Region};
+use crate::scene::Side;
 
 /// A sample counts as a discovery if it brought more than this multiple of the mean sample of its texel.
 const OUTSTANDING: f64 = 8.0;
@@ -41,8 +40,8 @@ pub(crate) fn learn(cache: &mut RadianceCache<'_>, texels: &[Texel], gathered: &
         cache.discoveries.extend(discovered.into_iter().map(discovery));
     }
     cache.discoveries.sort_by_key(|discovery| discovery.receiver);
-    gathered.par_iter_mut().for_each(|sums| sums.unguided = UnguidedLight::NONE);
-    cache.guide = Cow::Owned(cache.guide_of_patches.with(&cache.discoveries));
+    gathered.par_iter_mut().for_each(|sums| sums.unguided = UnguidedLight::default());
+    cache.guide = Cow::Owned(cache.exchange.guide.with(&cache.discoveries));
 }
 
 /// Whether one of a texel's samples outweighs the others, and the guide would hardly have led to it.
@@ -57,7 +56,7 @@ fn region_of(cache: &RadianceCache<'_>, texel: &Texel) -> Option<Region> {
         return None;
     }
     let point = texel.point(cache.scene, 0.5, 0.5)?;
-    cache.guide.region_of(cache.patches.at(point.triangle, Side::Front, point.at)?)
+    cache.guide.region_of(cache.exchange.patches.at(point.triangle, Side::Front, point.at)?)
 }
 
 #[cfg(test)]
@@ -65,7 +64,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::denoise::replicates::REPLICATES;
+    use crate::denoise::REPLICATES;
 
     #[test]
     fn only_a_sample_that_outweighs_the_others_is_a_discovery() {
@@ -73,7 +72,7 @@ mod tests {
         let sums = |light: f32| GatherSums {
             sums: [Vec3::splat(8.0); REPLICATES],
             samples: 4,
-            unguided: UnguidedLight { light, ..UnguidedLight::NONE },
+            unguided: UnguidedLight { light, ..UnguidedLight::default() },
             ..GatherSums::default()
         };
         assert!(has_discovery(&sums(16.1)));

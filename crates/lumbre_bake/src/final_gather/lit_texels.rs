@@ -4,13 +4,11 @@
 use glam::Vec3;
 
 use super::rounds::IndirectLight;
-use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::CoveredTexels;
 use crate::direct_light::DirectLight;
-use crate::scene::BakeScene;
 
 /// The covered texels and their light.
 pub(crate) struct LitTexels<'a> {
-    pub scene: &'a BakeScene,
     pub texels: &'a CoveredTexels<'a>,
     pub direct: &'a DirectLight,
     pub indirect: &'a IndirectLight,

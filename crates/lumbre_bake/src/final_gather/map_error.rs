@@ -1,10 +1,8 @@
 //! The error of all lightmaps together, as the report states it. The errors of single texels are in `error_ledger`.
 
 use super::error_ledger::{ErrorLedger, open_sum, relative_to, root};
-use crate::coverage::footprint::Texel;
-use crate::direct_light::local_light::LocalLight;
+use crate::ErrorPart;
 use crate::squared_errors::SquaredErrors;
-use crate::{BakeReport, ErrorPart};
 
 /// The expected error over all texels that are not hidden.
 pub(crate) struct MapError {
@@ -14,33 +12,21 @@ pub(crate) struct MapError {
     pub relative: f64,
     /// RMSE relative to the mean irradiance of the map.
     pub of_mean: f64,
+    /// What it is made of, the largest part first.
+    pub parts: Vec<ErrorPart>,
 }
 
 impl MapError {
     /// Sums up `errors`, the ledger's total per texel. `mean` is the map's mean irradiance in W/m², mean of the
     /// channels.
-    pub fn new(
-        ledger: &ErrorLedger<'_>,
-        errors: &SquaredErrors,
-        texels: &[Texel],
-        local: &LocalLight,
-        mean: f64,
-    ) -> Self {
-        let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
-        let relative_squares =
-            open_sum(texels, &local.relative(&errors.expected)) - ledger.by_chance(texels, local);
+    pub fn new(ledger: &ErrorLedger<'_>, errors: &SquaredErrors, mean: f64) -> Self {
+        let open = ledger.open_texels();
+        let relative_squares = ledger.relative_sum(&errors.expected) - ledger.by_chance();
         Self {
             relative_squares,
             relative: root(relative_squares / open),
-            of_mean: relative_to(mean, open_sum(texels, &errors.expected) / open),
+            of_mean: relative_to(mean, open_sum(&ledger.texels.list, &errors.expected) / open),
+            parts: ledger.parts(),
         }
-    }
-
-    /// Writes the error, its `parts`, and whether it is at most `target`, into the report.
-    pub fn write_report(&self, target: f64, parts: Vec<ErrorPart>, report: &mut BakeReport) {
-        report.estimated_error = self.relative;
-        report.error_of_mean = self.of_mean;
-        report.error_reached = self.relative <= target;
-        report.error_parts = parts;
     }
 }

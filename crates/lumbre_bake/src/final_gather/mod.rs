@@ -16,3 +16,12 @@ pub(crate) mod reused_gather;
 pub(crate) mod rounds;
 pub(crate) mod steep_light;
 pub(crate) mod texel_radiance;
+
+pub(crate) use error_ledger::ErrorLedger;
+pub(crate) use gather_sums::{GatherSums, UnguidedLight, Weights};
+pub(crate) use lit_texels::LitTexels;
+pub(crate) use map_error::MapError;
+pub(crate) use radiance_cache::RadianceCache;
+pub(crate) use reused_gather::ReusedGather;
+pub(crate) use rounds::{GatherReport, IndirectLight};
+pub(crate) use texel_radiance::TexelRadiance;

@@ -3,12 +3,13 @@
 
 use glam::{Vec2, Vec3};
 
+use super::gather_sums::GatherSums;
+use super::radiance_cache::RadianceCache;
 use crate::color::wide_channel_mean;
-use crate::coverage::footprint::Texel;
-use crate::denoise::replicates::{REPLICATES, mean, variance};
-use crate::final_gather::gather_sums::GatherSums;
-use crate::final_gather::radiance_cache::RadianceCache;
-use crate::scene::material::Side;
+use crate::coverage::Texel;
+use crate::denoise::REPLICATES;
+use crate::denoise::replicates::{mean, variance};
+use crate::scene::Side;
 
 /// Fewer gathered texels than this say nothing about the others.
 const MIN_GATHERED: u32 = 256;
@@ -32,8 +33,8 @@ pub(crate) fn from_patches(
 ) {
     let patch_light = |texel: &Texel| -> Vec3 {
         let Some(point) = texel.point(cache.scene, 0.5, 0.5) else { return Vec3::ZERO };
-        let patch = cache.patches.at(point.triangle, Side::Front, point.at);
-        patch.map_or(Vec3::ZERO, |patch| cache.patch_indirect[patch.place()])
+        let patch = cache.exchange.patches.at(point.triangle, Side::Front, point.at);
+        patch.map_or(Vec3::ZERO, |patch| cache.exchange.indirect[patch.place()])
     };
     let (mut squared_differences, mut scatter, mut squared_light, mut count) = (0.0f64, 0.0f64, 0.0, 0u32);
     for (texel, sums) in texels.iter().zip(&*gathered).filter(|(_, sums)| sums.rays > 0) {

@@ -3,20 +3,17 @@
 
 use std::borrow::Cow;
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::steep_light::steep_texels;
 use super::texel_radiance::{TexelRadiances, mean_reflectances};
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::denoise::replicates::REPLICATES;
+use crate::coverage::CoveredTexels;
+use crate::denoise::REPLICATES;
 use crate::direct_light::DirectLight;
 use crate::monitor::BakeMonitor;
-use crate::radiosity::exchange::Exchange;
-use crate::radiosity::patches::Patches;
-use crate::radiosity::sampling_guide::{Discovery, SamplingGuide};
-use crate::scene::material::Side;
-use crate::scene::{BakeScene, LightmapLayout};
-use crate::sources::light_sources::Sources;
+use crate::radiosity::{Discovery, Exchange, SamplingGuide};
+use crate::scene::{BakeScene, LightmapLayout, Side};
+use crate::sources::Sources;
 use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions};
 
@@ -25,26 +22,14 @@ pub(crate) struct RadianceCache<'a> {
     pub scene: &'a BakeScene,
     pub sources: &'a Sources<'a>,
     pub layout: &'a LightmapLayout,
-    pub patches: &'a Patches,
+    /// The light of patches, for points whose texel has none.
+    pub exchange: &'a Exchange,
     /// The light and the reflectance of texels.
     pub texels: TexelRadiances,
-    /// Irradiance of a surface under an unoccluded sky, W/m².
-    pub sky: Vec3,
-    /// Per patch, direct irradiance, for points whose texel has none.
-    pub patch_direct: &'a [Vec3],
-    /// Per patch, irradiance by bounces and by the sky.
-    pub patch_indirect: &'a [Vec3],
-    /// Per patch, the errors of `patch_indirect`, each with its sign: by the form factors' noise, and by the patches'
-    /// size.
-    pub patch_error: &'a [Vec2],
-    /// Per patch, the distance below which it is too coarse to be read, canonical units: nearer rays make another
-    /// bounce.
-    pub min_read_distance: &'a [f32],
     /// Radius on a surface within which the errors that rounds leave in texels are correlated, canonical units.
     pub correlation_radius: f32,
     /// Which regions the light of each region comes from: as the patches know it, and with all `discoveries`.
     pub guide: Cow<'a, SamplingGuide>,
-    pub guide_of_patches: &'a SamplingGuide,
     /// What the rounds have found so far that the patches' guide had missed.
     pub discoveries: Vec<Discovery>,
     /// Samples of each replicate in the first round.
@@ -57,9 +42,6 @@ const CORRELATED_TEXELS: f32 = 4.5;
 
 impl<'a> RadianceCache<'a> {
     /// The cache before the first round: direct light of texels, light by bounces of patches.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn new(
         sources: &'a Sources<'a>,
         texels: &CoveredTexels<'a>,
@@ -75,23 +57,15 @@ impl<'a> RadianceCache<'a> {
         for texel in &texels.divided {
             direct_by_place[texels.list[texel.place()].index.place()] = Vec3::NAN;
         }
-        let reflectance = monitor.run_interruptible(0.0, || {
-            mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list)
-        })?;
+        let reflectance = monitor.run_interruptible(0.0, || mean_reflectances(texels, &exchange.patches))?;
         Ok(Self {
             correlation_radius: CORRELATED_TEXELS * texels.side,
             texels: TexelRadiances::new(&direct_by_place, &steep, &reflectance),
             scene,
             sources,
             layout: texels.layout,
-            patches: &exchange.patches,
-            sky: sources.sky,
-            patch_direct: &exchange.direct,
-            patch_indirect: &exchange.indirect,
-            patch_error: &exchange.indirect_error,
-            min_read_distance: &exchange.near,
+            exchange,
             guide: Cow::Borrowed(&exchange.guide),
-            guide_of_patches: &exchange.guide,
             discoveries: Vec::new(),
             first_round_samples: effort.gather[0] / REPLICATES as u32,
         })
@@ -102,27 +76,27 @@ impl RadianceCache<'_> {
     /// The exitance of a point of a surface without its emission (all that it reflects, W/m²); zero where there is no
     /// patch.
     pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
-        let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
+        let Some(patch) = self.exchange.patches.at(triangle, side, at) else { return Vec3::ZERO };
         let texel = self.texels.at(self.texel_at(triangle, side, at));
         let gathered = texel.indirect().map(|light| light.irradiance);
-        let indirect = gathered.unwrap_or_else(|| self.patch_indirect[patch.place()]);
-        let direct = texel.direct().unwrap_or_else(|| self.patch_direct[patch.place()]);
+        let indirect = gathered.unwrap_or_else(|| self.exchange.indirect[patch.place()]);
+        let direct = texel.direct().unwrap_or_else(|| self.exchange.direct[patch.place()]);
         let irradiance = direct + indirect;
         self.reflectance_at(triangle, side, at) * irradiance
     }
 
     /// The reflectance at a point of a surface.
     pub(crate) fn reflectance_at(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Vec3 {
-        self.patches.reflectance(triangle, side).unwrap_or_else(|| {
+        self.exchange.patches.reflectance(triangle, side).unwrap_or_else(|| {
             let triangle = &self.scene.triangles[triangle as usize];
             let surface = &self.scene.surfaces[triangle.surface as usize];
             surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
         })
     }
 
-    /// The texel that shows a point of a surface; [`MapTexel::NONE`] on backs and outside the map.
-    pub(crate) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> MapTexel {
+    /// The texel that shows a point of a surface; `None` on backs and outside the map.
+    pub(crate) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> Option<MapTexel> {
         let texel = self.layout.texel_at(&self.scene.triangles[triangle as usize], at);
-        texel.filter(|_| side == Side::Front).unwrap_or(MapTexel::NONE)
+        texel.filter(|_| side == Side::Front)
     }
 }

@@ -1,6 +1,6 @@
 //! The light by bounces that is kept from a former bake. Not the choice of which texels keep it: that is `rebake`'s.
 
-use crate::final_gather::gather_sums::GatherSums;
+use super::gather_sums::GatherSums;
 
 /// The light by bounces that is kept from a former bake.
 pub(crate) struct ReusedGather {

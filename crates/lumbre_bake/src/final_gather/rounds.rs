@@ -15,20 +15,16 @@ use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
 use crate::chunks::decide;
 use crate::color::wide_channel_mean;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::Texel;
-use crate::denoise::nearness::Nearness;
-use crate::denoise::neighbourhoods::Neighbourhoods;
-use crate::denoise::replicates::{Estimates, REPLICATES, mean, spread};
-use crate::denoise::smooth::smooth;
+use crate::coverage::CoveredTexels;
+use crate::denoise::replicates::mean;
+use crate::denoise::{Denoised, Estimates, Neighbourhoods, REPLICATES};
 use crate::direct_light::DirectLight;
-use crate::direct_light::local_light::LocalLight;
 use crate::monitor::{BakeMonitor, Clock};
-use crate::sample_allocation::{SampleAllocation, allocate_within};
-use crate::sources::direct::Direct;
+use crate::report::StageNotes;
+use crate::sample_allocation::{SampleAllocation, SampleAllocator};
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
-use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
+use crate::{BakeError, BakeOptions, Ended, ErrorAtTime};
 
 /// More rays are not worthwhile if the error that they can reduce is less than this fraction of the squared error.
 const MIN_REDUCIBLE: f64 = 0.1;
@@ -72,8 +68,8 @@ pub(crate) struct IndirectLight {
 
 impl IndirectLight {
     /// For a scene where nothing bounces: no light, and the errors of direct light alone.
-    pub fn none(direct: &DirectLight) -> Self {
-        Self { variances: ErrorLedger::of_direct_light(direct).total(), ..Self::default() }
+    pub fn none(texels: &CoveredTexels<'_>, direct: &DirectLight) -> Self {
+        Self { variances: ErrorLedger::of_direct_light(texels, direct).total(), ..Self::default() }
     }
 
     /// The sum of direct and indirect light of every covered texel, W/m².
@@ -83,11 +79,17 @@ impl IndirectLight {
     }
 }
 
+/// The figures of the final gather, as in [`BakeReport`](crate::BakeReport).
+pub(crate) struct GatherReport {
+    pub error: MapError,
+    pub curve: Vec<ErrorAtTime>,
+    pub ended: Ended,
+    pub leaked_rays: u64,
+    pub gather_rays: f64,
+}
+
 /// Gathers bounced light in rounds, starting with the sums `reused` from a previous bake. Afterwards the cache also
 /// holds the gathered light, for rays of later stages.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn gather(
     cache: &mut RadianceCache<'_>,
     texels: &CoveredTexels<'_>,
@@ -95,14 +97,12 @@ pub(crate) fn gather(
     reused: Option<&ReusedGather>,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<IndirectLight, BakeError> {
+) -> Result<((IndirectLight, GatherReport), StageNotes), BakeError> {
     let list = &texels.list;
     let leaked_before = cache.scene.leaks.count();
-    let neighbourhoods = monitor.run_interruptible(0.0, || {
-        Neighbourhoods::new(cache.scene, texels.layout, list, &texels.charts, &[])
-    })?;
+    let neighbourhoods = monitor.run_interruptible(0.0, || Neighbourhoods::new(texels, &[]))?;
     let planner = RoundPlanner::new(&neighbourhoods, texels, direct, reused, options);
+    let mut curve = Vec::new();
     let no_sums = || vec![GatherSums::default(); list.len()];
     let mut gathered = reused.map_or_else(no_sums, |reused| reused.gathered.clone());
     let wanted = planner.first_samples(&gathered);
@@ -114,21 +114,24 @@ pub(crate) fn gather(
     speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
     let mut plan: Option<RoundPlan> = None;
     let mut stalled_rounds = 0;
-    let mut reads = TexelReads::new(cache.patches.mean_reflectance(), &gathered);
-    let result = loop {
+    let mut reads = TexelReads::new(cache.exchange.patches.mean_reflectance(), &gathered);
+    let (result, ended) = loop {
         let begun = monitor.seconds();
-        let result = planner.evaluate(&gathered, &reads, monitor, report)?;
+        let result = planner.evaluate(&gathered, &reads, cache.exchange.residual_bound, monitor)?;
+        let error = result.error.relative;
+        let is_reached = error <= options.error;
+        curve.push(ErrorAtTime { seconds: result.seconds, error });
         // A round needs time for its rays, and for another evaluation.
         let affordable = speed.affordable_samples(monitor.seconds() - begun, monitor.clock());
         let next = planner.plan(&gathered, &result, decide(monitor, affordable)?);
         let is_late = !in_time || monitor.clock().is_over() || next.is_late;
-        let is_hardly_reducible = next.reducible_error <= MIN_REDUCIBLE * result.relative_squares;
+        let is_hardly_reducible = next.reducible_error <= MIN_REDUCIBLE * result.error.relative_squares;
         let has_stalled = plan.as_ref().is_some_and(|plan| plan.has_stalled(next.reducible_error));
         stalled_rounds = if has_stalled { stalled_rounds + 1 } else { 0 };
-        report.ended = Ended::after(report.error_reached, is_late || monitor.is_late(), next.is_last);
+        let ended = Ended::after(is_reached, is_late || monitor.is_late(), next.is_last);
         let rays_gain_nothing = is_hardly_reducible || stalled_rounds == MAX_STALLED_ROUNDS;
-        if report.error_reached || is_late || rays_gain_nothing || is_all_reused || next.is_last {
-            break result;
+        if is_reached || is_late || rays_gain_nothing || is_all_reused || next.is_last {
+            break (result, ended);
         }
         let variances = &result.reducible.expected;
         monitor.run_interruptible(1.0, || {
@@ -137,23 +140,24 @@ pub(crate) fn gather(
         })?;
         monitor.pass(ROUND_PROGRESS);
         let rest = planner.open.iter().map(|texel| reads.rest_in(&gathered[texel.place()])).sum::<f64>();
-        reads.add(next.samples(&gathered), rest / planner.count());
+        reads.add((next.added * REPLICATES as u64) as f64, rest / planner.count());
         let (begun, samples) = (monitor.seconds(), all_samples(&gathered));
         in_time = cache.cast(list, &next.wanted, &mut gathered, options.seed, monitor)?;
         speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
         plan = Some(next);
     };
-    let RoundResult { light, variances, .. } = result;
+    let RoundResult { light, variances, error, .. } = result;
     monitor.run_interruptible(1.0, || {
         cache.texels.set_indirect(list, &gathered, &light, &variances.expected);
     })?;
-    report.leaked_rays = cache.scene.leaks.count() - leaked_before;
-    report.rays += gathered.iter().map(|sums| sums.rays).sum::<u64>();
     // Texels for which there was no time have no rays: their sums are those of a neighbour, or the light of their patch.
     let cast = gathered.iter().filter(|sums| sums.rays > 0);
     let cast: u64 = cast.map(|sums| u64::from(sums.samples) * REPLICATES as u64).sum();
-    report.gather_rays = cast as f64 / planner.open.len().max(1) as f64;
-    Ok(IndirectLight { light, variances, gathered })
+    let gather_rays = cast as f64 / planner.count();
+    let leaked_rays = cache.scene.leaks.count() - leaked_before;
+    let rays = gathered.iter().map(|sums| sums.rays).sum::<u64>();
+    let report = GatherReport { error, curve, ended, leaked_rays, gather_rays };
+    Ok(((IndirectLight { light, variances, gathered }, report), StageNotes::of_rays(rays)))
 }
 
 /// Samples per replicate, of all texels together.
@@ -186,9 +190,8 @@ impl CastSpeed {
 /// Estimates light and errors after each round, and decides where the next one casts its rays.
 struct RoundPlanner<'a> {
     neighbourhoods: &'a Neighbourhoods<'a>,
-    texels: &'a [Texel],
-    direct: &'a [Direct],
-    local: &'a LocalLight,
+    texels: &'a CoveredTexels<'a>,
+    direct: &'a DirectLight,
     /// The covered texels that are not hidden.
     open: Vec<CoveredTexel>,
     /// Mean direct light of the open texels, W/m², mean of the channels.
@@ -206,14 +209,17 @@ struct RoundResult {
     variances: SquaredErrors,
     /// The part of `variances` that more rays reduce.
     reducible: SquaredErrors,
-    /// Sum over the open texels of their squared errors, each relative to the light around its texel.
-    relative_squares: f64,
+    /// The error of the whole map, and the seconds that the bake had taken when it was known.
+    error: MapError,
+    seconds: f64,
 }
 
 /// What the next round should cast.
 struct RoundPlan {
     wanted: Vec<SampleAllocation>,
-    /// The part of [`RoundResult::relative_squares`] that rays reduce.
+    /// Samples of each replicate that it adds, of all texels together.
+    added: u64,
+    /// The part of [`MapError::relative_squares`] that rays reduce.
     reducible_error: f64,
     /// The quality's rays are spent, or no texel would get more: there is no next round.
     is_last: bool,
@@ -224,14 +230,6 @@ struct RoundPlan {
 }
 
 impl RoundPlan {
-    /// How many samples, of all replicates together, are to be added to what has been `gathered`.
-    fn samples(&self, gathered: &[GatherSums]) -> f64 {
-        let added = |allocation: &SampleAllocation| {
-            f64::from(allocation.samples) - f64::from(gathered[allocation.texel.place()].samples)
-        };
-        self.wanted.iter().map(added).sum::<f64>() * REPLICATES as f64
-    }
-
     /// Returns true if the round that followed this plan hardly reduced the error: `left` is its reducible error
     /// afterwards.
     fn has_stalled(&self, left: f64) -> bool {
@@ -254,9 +252,8 @@ impl<'a> RoundPlanner<'a> {
         let sum = direct.texels.iter().map(|direct| wide_channel_mean(direct.baked)).sum::<f64>();
         Self {
             neighbourhoods,
-            texels: list,
-            direct: &direct.texels,
-            local: &direct.local,
+            texels,
+            direct,
             mean_direct: sum / open.len().max(1) as f64,
             open,
             reuse_error: reused.map_or(&[], |reused| &reused.reuse_error),
@@ -276,48 +273,39 @@ impl<'a> RoundPlanner<'a> {
         without_samples.map(|texel| SampleAllocation { texel, samples }).collect()
     }
 
-    /// Estimates the light from the samples, smooths it, and estimates its errors, which are written into the report.
+    /// Estimates the light from the samples, smooths it, and estimates its errors. `residual_bound` is the solver's.
     fn evaluate(
         &self,
         gathered: &[GatherSums],
         reads: &TexelReads,
+        residual_bound: f64,
         monitor: &mut BakeMonitor<'_>,
-        report: &mut BakeReport,
     ) -> Result<RoundResult, BakeError> {
-        let (neighbourhoods, texels, local) = (self.neighbourhoods, self.texels, self.local);
+        let neighbourhoods = self.neighbourhoods;
         let raw: Vec<Estimates> = gathered.par_iter().map(GatherSums::estimates).collect();
-        let (estimates, smoothing) = monitor.run_interruptible(1.0, || match self.options.denoise {
-            true => {
-                let nearness: Vec<Nearness> = gathered.par_iter().map(GatherSums::mean_nearness).collect();
-                smooth(neighbourhoods, &raw, &nearness)
-            }
-            false => (raw.clone(), vec![0.0; texels.len()]),
+        let nearness = |place: usize| gathered[place].mean_nearness();
+        let denoised = Denoised::new(neighbourhoods, &raw, nearness, self.options.denoise, monitor)?;
+        let patches = monitor.run_interruptible(1.0, || {
+            patch_bias(neighbourhoods, &self.texels.list, gathered, &raw, reads)
         })?;
-        let patches =
-            monitor.run_interruptible(1.0, || patch_bias(neighbourhoods, texels, gathered, &raw, reads))?;
-        let noise = monitor.run_interruptible(1.0, || spread(neighbourhoods, &estimates))?;
-        let bounced = estimates.iter().map(|e| wide_channel_mean(mean(e))).sum::<f64>();
+        let bounced = denoised.estimates.iter().map(|e| wide_channel_mean(mean(e))).sum::<f64>();
         let total = self.mean_direct + bounced / self.count();
         let gather = GatherErrors {
             gathered,
-            estimates: &estimates,
-            noise: &noise,
-            smoothing: &smoothing,
+            denoised: &denoised,
             patches: &patches,
-            residual_bound: report.residual_bound,
+            residual_bound,
             kept: self.reuse_error,
         };
-        let ledger = ErrorLedger { direct: self.direct, gather: Some(gather), light: total as f32 };
+        let (texels, direct) = (self.texels, self.direct);
+        let ledger = ErrorLedger { texels, direct, gather: Some(gather), light: total as f32 };
         let variances = ledger.total();
-        let map_error = MapError::new(&ledger, &variances, texels, local, total);
-        let parts = monitor.run_interruptible(1.0, || ledger.parts(texels, local))?;
-        map_error.write_report(self.options.error, parts, report);
-        report.curve.push(ErrorAtTime { seconds: monitor.seconds(), error: report.estimated_error });
-        monitor.note_error(report.estimated_error);
+        let error = monitor.run_interruptible(1.0, || MapError::new(&ledger, &variances, total))?;
+        let seconds = monitor.seconds();
+        monitor.note_error(error.relative);
         monitor.advance(1.0)?;
-        let light = without_patch_bias(&estimates, &patches);
-        let (reducible, relative_squares) = (ledger.by_rays(), map_error.relative_squares);
-        Ok(RoundResult { light, variances, reducible, relative_squares })
+        let light = without_patch_bias(&denoised.estimates, &patches);
+        Ok(RoundResult { light, variances, reducible: denoised.errors(), error, seconds })
     }
 
     /// Allocates the rays of the next round such that they reduce the reducible part of the error to what is needed to
@@ -327,9 +315,9 @@ impl<'a> RoundPlanner<'a> {
         // From the second round on, rays read the light of texels instead of patches, and so also reduce the error that
         // was read from patches. The bias that is measured by checks against real bounces is not counted as reducible.
         let read: Vec<f32> = gathered.par_iter().map(GatherSums::squared_read_error).collect();
-        let by_rays = self.local.relative_errors(&result.reducible.with(&read));
-        let reducible_error = open_sum(self.texels, &by_rays.expected);
-        let irreducible_error = result.relative_squares - reducible_error;
+        let by_rays = self.direct.local.relative_errors(&result.reducible.with(&read));
+        let reducible_error = open_sum(&self.texels.list, &by_rays.expected);
+        let irreducible_error = result.error.relative_squares - reducible_error;
         let requested = self.count() * self.options.error.powi(2);
 
         let samples: Vec<u32> = gathered.iter().map(|sums| sums.samples).collect();
@@ -337,7 +325,7 @@ impl<'a> RoundPlanner<'a> {
         let limit = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
         let budget = limit.saturating_sub(cast);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
-        let requested_over_left = requested / result.relative_squares.max(f64::MIN_POSITIVE);
+        let requested_over_left = requested / result.error.relative_squares.max(f64::MIN_POSITIVE);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP;
         let (target, budget) = match is_small_step {
             true => {
@@ -352,28 +340,29 @@ impl<'a> RoundPlanner<'a> {
             .max(MIN_REDUCIBLE * irreducible_error)
             .max(reducible_error / MAX_REDUCTION);
         // Rays are allocated by the cautious errors, so the goal for the expected ones is scaled to those.
-        let goal = goal * open_sum(self.texels, &by_rays.cautious) / reducible_error.max(f64::MIN_POSITIVE);
-        let open = self.open.iter().copied();
-        let errors = &by_rays.cautious;
-        let within = |budget: u64| {
-            allocate_within(budget, open.clone(), errors, &samples, max_samples, CONVERGENCE_ORDER, goal)
+        let goal =
+            goal * open_sum(&self.texels.list, &by_rays.cautious) / reducible_error.max(f64::MIN_POSITIVE);
+        let allocator = SampleAllocator {
+            texels: &self.open,
+            variances: &by_rays.cautious,
+            samples: &samples,
+            most: max_samples,
+            order: CONVERGENCE_ORDER,
         };
-        let mut wanted = within(budget);
-        let more = |allocation: &SampleAllocation| {
-            u64::from(allocation.samples) - u64::from(samples[allocation.texel.place()])
-        };
-        let is_short_of_time = wanted.iter().map(more).sum::<u64>() > affordable;
+        let mut wanted = allocator.within(budget, goal);
+        let is_short_of_time = allocator.added(&wanted) > affordable;
         let is_late = is_short_of_time && (affordable as f64) < MIN_ROUND * cast as f64;
         if is_late {
             wanted = Vec::new();
         } else if is_short_of_time {
-            wanted = within(affordable);
+            wanted = allocator.within(affordable, goal);
         }
         RoundPlan {
             reducible_error,
             is_last: (is_spent && !is_small_step) || (wanted.is_empty() && !is_late),
             is_small_step,
             is_late,
+            added: allocator.added(&wanted),
             wanted,
         }
     }

@@ -7,9 +7,8 @@ use glam::{Vec2, Vec3};
 use super::incident::Hit;
 use super::radiance_cache::RadianceCache;
 use crate::color::channel_mean;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{FootprintPoint, open_texels, receiver};
-use crate::direct_light::local_light::LocalLight;
+use crate::coverage::{CoveredTexels, FootprintPoint, receiver};
+use crate::direct_light::LocalLight;
 use crate::sampling::Sequence;
 use crate::texel_index::MapTexel;
 
@@ -24,7 +23,7 @@ const SAMPLES: u32 = 1;
 /// Which texels of all maps have steep direct light. `direct` is per texel of all maps, NaN where it is not known.
 pub(crate) fn steep_texels(texels: &CoveredTexels<'_>, direct: &[Vec3], local: &LocalLight) -> Vec<bool> {
     let mut steep = vec![false; direct.len()];
-    for (covered, texel) in open_texels(&texels.list) {
+    for (covered, texel) in texels.open() {
         let map = &texels.layout.maps[texel.object as usize];
         let light = |near: MapTexel| channel_mean(direct[near.place()]);
         let around = map.neighbourhood(texel.x, texel.y, 1).map(light).filter(|light| light.is_finite());

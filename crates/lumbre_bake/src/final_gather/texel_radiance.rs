@@ -3,11 +3,10 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::coverage::footprint::{Footprint, FootprintPoint, Texel};
-use crate::final_gather::gather_sums::GatherSums;
-use crate::radiosity::patches::Patches;
-use crate::scene::material::Side;
-use crate::scene::{BakeScene, LightmapLayout};
+use super::gather_sums::GatherSums;
+use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel};
+use crate::radiosity::Patches;
+use crate::scene::Side;
 use crate::texel_index::MapTexel;
 
 /// What rays read of every texel of all maps.
@@ -93,10 +92,10 @@ impl TexelRadiances {
         }
     }
 
-    /// What is known of a texel.
+    /// What is known of a texel, or of a point that no texel shows.
     #[inline]
-    pub fn at(&self, texel: MapTexel) -> &TexelRadiance {
-        self.0.get(texel.place()).unwrap_or(&TexelRadiance::UNKNOWN)
+    pub fn at(&self, texel: Option<MapTexel>) -> &TexelRadiance {
+        texel.map_or(&TexelRadiance::UNKNOWN, |texel| &self.0[texel.place()])
     }
 }
 
@@ -107,12 +106,8 @@ const POINTS: [[f32; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [
 /// Per texel of all maps, the mean reflectance of its front, where a texture makes it vary over the triangle; NaN
 /// elsewhere, and where light passes through parts of the surface, since rays hit only the rest. Empty where no texel
 /// has such a mean.
-pub(crate) fn mean_reflectances(
-    scene: &BakeScene,
-    layout: &LightmapLayout,
-    patches: &Patches,
-    texels: &[Texel],
-) -> Vec<Vec3> {
+pub(crate) fn mean_reflectances(texels: &CoveredTexels<'_>, patches: &Patches) -> Vec<Vec3> {
+    let scene = texels.scene;
     let at_point = |point: &FootprintPoint| {
         let triangle = &scene.triangles[point.triangle as usize];
         let surface = &scene.surfaces[triangle.surface as usize];
@@ -132,8 +127,8 @@ pub(crate) fn mean_reflectances(
         let reflectances = reflectances.filter(|reflectances| !reflectances.is_empty())?;
         Some((texel.index, reflectances.iter().sum::<Vec3>() / reflectances.len() as f32))
     };
-    let means: Vec<(MapTexel, Vec3)> = texels.par_iter().filter_map(of_texel).collect();
-    let mut by_place = if means.is_empty() { Vec::new() } else { vec![Vec3::NAN; layout.texels] };
+    let means: Vec<(MapTexel, Vec3)> = texels.list.par_iter().filter_map(of_texel).collect();
+    let mut by_place = if means.is_empty() { Vec::new() } else { vec![Vec3::NAN; texels.layout.texels] };
     for (texel, reflectance) in means {
         by_place[texel.place()] = reflectance;
     }

@@ -6,10 +6,9 @@
 use glam::{DMat2, DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
+use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
-use crate::coverage::contact_lines::ContactLines;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Footprint, Texel};
+use crate::coverage::{ContactLines, CoveredTexels, Footprint, Texel};
 use crate::scene::{LightmapLayout, MapLayout};
 
 /// Added to the variance of the neighbours' positions along each axis, in square texels: where that is much smaller,
@@ -42,7 +41,7 @@ fn fill_map(
     rings: u32,
     stop: &CancelToken,
 ) -> Vec<Option<TexelValue>> {
-    let (width, height) = (map.width, map.height);
+    let width = map.width;
     // First the charts' own texels, moved to their centres.
     let mut current: Vec<Option<TexelValue>> = (0..known.len())
         .into_par_iter()
@@ -74,7 +73,7 @@ fn fill_map(
                     return current[index];
                 }
                 let (x, y) = (index as u32 % width, index as u32 / width);
-                let chart = nearest_chart(width, height, &current, x, y)?;
+                let chart = nearest_chart(map, &current, x, y)?;
                 let (value, variance) = extrapolate(map, &current, (x, y), chart, None)?;
                 Some(TexelValue { value, variance, middle: Vec2::splat(0.5), chart })
             })
@@ -97,10 +96,10 @@ enum Hidden {
 }
 
 /// The chart of the nearest known one of the eight neighbours.
-fn nearest_chart(width: u32, height: u32, known: &[Option<TexelValue>], x: u32, y: u32) -> Option<u32> {
+fn nearest_chart(map: &MapLayout, known: &[Option<TexelValue>], x: u32, y: u32) -> Option<u32> {
     let mut best: Option<(u32, u32)> = None;
-    for (nx, ny) in texels_within(width, height, x, y, 1) {
-        if let Some(neighbour) = &known[(ny * width + nx) as usize] {
+    for (nx, ny) in map.around(x, y, 1) {
+        if let Some(neighbour) = &known[(ny * map.width + nx) as usize] {
             let distance = x.abs_diff(nx) + y.abs_diff(ny);
             if best.is_none_or(|(least, _)| distance < least) {
                 best = Some((distance, neighbour.chart));
@@ -121,23 +120,22 @@ fn extrapolate(
     chart: u32,
     is_beside: Option<&dyn Fn(Vec2) -> bool>,
 ) -> Option<(Vec3, f32)> {
-    let (width, height) = (map.width, map.height);
     let center = Vec2::new(x as f32, y as f32) + 0.5;
     let mut moments = [0.0f64; 6];
     let mut sums = [glam::DVec3::ZERO; 3];
     // Ranges of the values of the nine nearest texels, and of those one texel further out.
-    let mut ranges = [(Vec3::INFINITY, Vec3::NEG_INFINITY); 2];
+    let mut ranges = [Bounds::<Vec3>::default(); 2];
     // Distance, value and squared error.
     let mut nearest = (f32::INFINITY, Vec3::ZERO, 0.0);
     // Weights, offsets from the centre, and squared errors.
     let mut terms = [(0.0f64, DVec2::ZERO, 0.0f64); 25];
     let mut count = 0;
-    for (nx, ny) in texels_within(width, height, x, y, 2) {
+    for (nx, ny) in map.around(x, y, 2) {
         let is_itself = nx == x && ny == y;
         if is_itself && is_beside.is_none() {
             continue;
         }
-        let Some(other) = known[(ny * width + nx) as usize].filter(|other| other.chart == chart) else {
+        let Some(other) = known[(ny * map.width + nx) as usize].filter(|other| other.chart == chart) else {
             continue;
         };
         let place = Vec2::new(nx as f32, ny as f32) + other.middle;
@@ -155,8 +153,7 @@ fn extrapolate(
         for (sum, term) in sums.iter_mut().zip([1.0, dx, dy]) {
             *sum += value * (weight * term);
         }
-        let range = &mut ranges[usize::from(x.abs_diff(nx).max(y.abs_diff(ny)) > 1)];
-        *range = (range.0.min(other.value), range.1.max(other.value));
+        ranges[usize::from(x.abs_diff(nx).max(y.abs_diff(ny)) > 1)].extend([other.value]);
         if d.length() < nearest.0 {
             nearest = (d.length(), other.value, other.variance);
         }
@@ -176,7 +173,7 @@ fn extrapolate(
     let value = (mean + (with_x - mean * sx) * to_centre.x + (with_y - mean * sy) * to_centre.y).as_vec3();
     // The nearest texels alone give the range, if there are any: a shadow's edge two texels away must not reach this
     // one.
-    let (low, high) = if ranges[0].0.x <= ranges[0].1.x { ranges[0] } else { ranges[1] };
+    let Bounds { low, high } = if ranges[0].low.x <= ranges[0].high.x { ranges[0] } else { ranges[1] };
     let margin = (high - low) * 0.5;
     let value = value.clamp((low - margin).max(Vec3::ZERO), high + margin);
     let (mut independent, mut correlated) = (0.0, 0.0);
@@ -189,41 +186,26 @@ fn extrapolate(
     Some(if value.is_finite() && variance.is_finite() { (value, variance) } else { (nearest.1, nearest.2) })
 }
 
-/// The texels within `radius` of a texel, itself included, row by row.
-pub(super) fn texels_within(
-    width: u32,
-    height: u32,
-    x: u32,
-    y: u32,
-    radius: u32,
-) -> impl Iterator<Item = (u32, u32)> {
-    let columns = x.saturating_sub(radius)..=(x + radius).min(width - 1);
-    let rows = y.saturating_sub(radius)..=(y + radius).min(height - 1);
-    rows.flat_map(move |ny| columns.clone().map(move |nx| (nx, ny)))
-}
-
 /// Fills all maps from values and squared errors per covered texel. Values are NaN where nothing is known; errors are
 /// NaN there, too, and wherever a texel shows no surface of its own.
 pub(crate) fn fill(
     texels: &CoveredTexels<'_>,
     (values, variances): (&[Vec3], &[f32]),
     rings: u32,
-    stop: &CancelToken,
 ) -> (Vec<Vec3>, Vec<f32>) {
-    let CoveredTexels { layout, list: texels, charts, contacts, .. } = texels;
+    let CoveredTexels { scene, layout, contacts, .. } = texels;
     let mut known: Vec<Option<TexelValue>> = vec![None; layout.texels];
-    for (texel, (&value, &variance)) in texels.iter().zip(values.iter().zip(variances)) {
-        if !texel.is_hidden() {
-            let chart = charts[texel.triangle as usize];
-            known[texel.index.place()] = Some(TexelValue { value, variance, middle: texel.middle(), chart });
-        }
+    for (covered, texel) in texels.open() {
+        let (value, variance) = (values[covered.place()], variances[covered.place()]);
+        let (middle, chart) = (texel.middle(), texels.chart(texel));
+        known[texel.index.place()] = Some(TexelValue { value, variance, middle, chart });
     }
-    let hidden = hidden(layout, texels, if rings >= BICUBIC_RINGS { 2 } else { 1 });
+    let hidden = hidden(layout, &texels.list, if rings >= BICUBIC_RINGS { 2 } else { 1 });
     let mut filled = Vec::with_capacity(layout.texels);
     let mut errors = Vec::with_capacity(layout.texels);
     for map in &layout.maps {
         let known = &known[map.places()];
-        let map = fill_map(map, known, contacts, &hidden[map.places()], rings, stop);
+        let map = fill_map(map, known, contacts, &hidden[map.places()], rings, &scene.stop);
         filled.extend(map.iter().map(|texel| texel.map_or(Vec3::NAN, |texel| texel.value)));
         let error = |(texel, known): (&Option<TexelValue>, &Option<TexelValue>)| {
             texel.filter(|_| known.is_some()).map_or(f32::NAN, |texel| texel.variance)
@@ -241,7 +223,7 @@ fn hidden(layout: &LightmapLayout, texels: &[Texel], reach: u32) -> Vec<Hidden> 
     }
     for texel in texels {
         let map = &layout.maps[texel.object as usize];
-        for (x, y) in texels_within(map.width, map.height, texel.x, texel.y, reach) {
+        for (x, y) in map.around(texel.x, texel.y, reach) {
             let other = &mut hidden[map.texel(x, y).place()];
             if *other == Hidden::Deep {
                 let center = Vec2::new(x as f32 - texel.x as f32, y as f32 - texel.y as f32) + 0.5;

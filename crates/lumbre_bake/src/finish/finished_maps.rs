@@ -5,57 +5,54 @@ use super::baked_maps::{BakedMap, BakedObject, FilledTexels, baked_objects};
 use super::fill::fill;
 use super::pages::Pages;
 use super::resolution_error::{DensePoint, compare};
-use super::seams::{MapValues, Maps, close_seams};
+use super::seams::{MapValues, close_seams};
 use super::separate_light::separate;
-use crate::final_gather::lit_texels::LitTexels;
+use crate::final_gather::LitTexels;
 use crate::monitor::BakeMonitor;
+use crate::report::{ResolutionReport, SeamReport, StageNotes};
 use crate::scene::SceneObject;
 use crate::stage::Stage;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::{BakeError, BakeOptions};
 
-/// The objects of a scene with their finished maps. `points` are what the finished maps are compared with, to measure what their resolution costs.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
+/// The objects of a scene with their finished maps, and the figures of these, as in [`BakeReport`](crate::BakeReport).
+pub(crate) struct FinishedMaps {
+    pub objects: Vec<BakedObject>,
+    pub maps: Vec<BakedMap>,
+    pub atlases: usize,
+    pub seams: SeamReport,
+    pub resolution: ResolutionReport,
+}
+
+/// Finishes the maps of all objects. `mean` is their mean irradiance, mean of the channels; `points` are what the finished maps are compared with, to measure what their resolution costs.
 pub(crate) fn finished_maps(
     lit: &LitTexels<'_>,
     points: &[DensePoint],
+    mean: f64,
     objects: &[SceneObject],
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<(Vec<BakedObject>, Vec<BakedMap>), BakeError> {
-    let LitTexels { scene, texels, .. } = *lit;
-    let layout = texels.layout;
+) -> Result<(FinishedMaps, StageNotes), BakeError> {
+    let texels = lit.texels;
     monitor.advance(0.2)?;
     let light_and_errors = (lit.light, lit.indirect.variances.cautious.as_slice());
     let (mut irradiance, mut variances) =
-        monitor.run_interruptible(0.2, || fill(texels, light_and_errors, options.gap, &scene.stop))?;
+        monitor.run_interruptible(0.2, || fill(texels, light_and_errors, options.gap))?;
     monitor.advance(1.0)?;
 
-    monitor.stage(Stage::Seams, report)?;
-    let maps = Maps {
-        scene,
-        layout,
-        texels: &texels.list,
-        charts: &texels.charts,
-        mean: report.mean_irradiance.iter().sum::<f64>() / 3.0,
-    };
+    monitor.stage(Stage::Seams)?;
     let values = MapValues { light: &mut irradiance, variances: &mut variances };
-    close_seams(&maps, values, options, monitor, report)?;
+    let (seams, notes) = close_seams(texels, mean, values, options, monitor)?;
     monitor.advance(0.9)?;
-    report.resolution =
-        monitor.run_interruptible(0.9, || compare(scene, layout, &irradiance, &variances, points))?;
-    let pages = monitor.run_interruptible(0.9, || Pages::new(layout, options.atlas_size, options.gap))?;
-    report.atlases = pages.pages.len();
-    report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
+    let resolution = monitor.run_interruptible(0.9, || compare(texels, &irradiance, &variances, points))?;
+    let pages =
+        monitor.run_interruptible(0.9, || Pages::new(texels.layout, options.atlas_size, options.gap))?;
     let separate = monitor.run_interruptible(1.0, || {
-        options
-            .separate_light
-            .then(|| separate(texels, (lit.direct, lit.indirect), &irradiance, options.gap, &scene.stop))
+        options.separate_light.then(|| separate(texels, (lit.direct, lit.indirect), &irradiance, options.gap))
     })?;
     let filled = FilledTexels { irradiance: &irradiance, variances: &variances, separate: separate.as_ref() };
-    let finished = monitor.run_interruptible(1.0, || baked_objects(objects, layout, &filled, &pages))?;
+    let (objects, maps) =
+        monitor.run_interruptible(1.0, || baked_objects(objects, texels.layout, &filled, &pages))?;
     monitor.advance(1.0)?;
-    Ok(finished)
+    let atlases = pages.pages.len();
+    Ok((FinishedMaps { objects, maps, atlases, seams, resolution }, notes))
 }

@@ -9,3 +9,6 @@ pub(crate) mod resolution_error;
 pub(crate) mod seams;
 pub(crate) mod separate_light;
 pub(crate) mod worst_places;
+
+pub(crate) use baked_maps::{BakedMap, BakedObject, TexelErrors};
+pub(crate) use finished_maps::FinishedMaps;

@@ -14,7 +14,7 @@ use crate::scene::LightmapLayout;
 
 /// Where an object's map lies on the pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct PagePlacement {
     pub page: usize,
     /// Column and row of its first texel on the page.
     pub x: u32,
@@ -35,7 +35,7 @@ pub(crate) struct Page {
 pub(crate) struct Pages {
     pub pages: Vec<Page>,
     /// Per object, its place; `None` where it keeps a map of its own.
-    pub places: Vec<Option<Place>>,
+    pub places: Vec<Option<PagePlacement>>,
     /// Width of the border of repeated texels around each map.
     margin: u32,
 }
@@ -69,7 +69,8 @@ impl Pages {
             let page = pages.pages.len();
             for &member in on_page {
                 let at = packed.placements[member];
-                pages.places[members[member]] = Some(Place { page, x: at.x + margin, y: at.y + margin });
+                pages.places[members[member]] =
+                    Some(PagePlacement { page, x: at.x + margin, y: at.y + margin });
             }
             pages.pages.push(Page {
                 width,

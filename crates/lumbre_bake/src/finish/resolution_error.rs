@@ -8,19 +8,17 @@ use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::chunks::in_chunks;
-use crate::coverage::footprint::{Footprint, FootprintPoint, Texel, receiver};
-use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::gather_sums::GatherSums;
-use crate::final_gather::radiance_cache::RadianceCache;
+use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel, receiver};
+use crate::denoise::REPLICATES;
+use crate::final_gather::{GatherSums, RadianceCache};
 use crate::monitor::BakeMonitor;
-use crate::report::ResolutionReport;
+use crate::report::{ResolutionReport, StageNotes};
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
-use crate::scene::Receiver;
-use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
-use crate::sources::light_sources::Sources;
+use crate::scene::{Receiver, SurfaceHit};
+use crate::sources::Sources;
 use crate::stage::Stage;
 use crate::texel_index::MapTexel;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::{BakeError, BakeOptions};
 
 /// The points get one part in this many of the bake's rays, and never fewer than take no noticeable time.
 const RAYS_DIVISOR: u64 = 20;
@@ -50,32 +48,27 @@ pub(crate) struct DensePoint {
 }
 
 /// The points that the finished map is compared with; none if the comparison is switched off, or the time is up.
-/// `cache` is `None` where nothing bounces.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
+/// `cache` is `None` where nothing bounces; `rays` is how many rays the bake has cast so far.
 pub(crate) fn dense_points(
     sources: &Sources<'_>,
     cache: Option<&RadianceCache<'_>>,
+    rays: u64,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<Vec<DensePoint>, BakeError> {
+) -> Result<(Vec<DensePoint>, StageNotes), BakeError> {
     if !options.resolution_error || monitor.clock().is_over() {
         let why = if options.resolution_error { "the time is up" } else { "switched off" };
-        report.skipped.push(format!("resolution error: {why}"));
-        return Ok(Vec::new());
+        return Ok((Vec::new(), StageNotes::of_skipped(format!("resolution error: {why}"))));
     }
-    monitor.stage(Stage::Resolution, report)?;
-    let baker = PointBaker { scene: sources.scene, sources, cache };
-    let points = baker.bake_points(report.rays, options, monitor)?;
-    report.rays += points.iter().map(|point| point.rays).sum::<u64>();
-    Ok(points)
+    monitor.stage(Stage::Resolution)?;
+    let baker = PointBaker { sources, cache };
+    let points = baker.bake_points(rays, options, monitor)?;
+    let notes = StageNotes::of_rays(points.iter().map(|point| point.rays).sum());
+    Ok((points, notes))
 }
 
 /// Computes the light at single points.
 struct PointBaker<'a> {
-    scene: &'a BakeScene,
     sources: &'a Sources<'a>,
     /// `None` where nothing bounces.
     cache: Option<&'a RadianceCache<'a>>,
@@ -92,6 +85,7 @@ impl PointBaker<'_> {
         // Running sums of the triangles' areas, to choose triangles by.
         let mut area = 0.0;
         let ends: Vec<f64> = self
+            .sources
             .scene
             .triangles
             .iter()
@@ -116,7 +110,7 @@ impl PointBaker<'_> {
     fn bake_point(&self, triangle: u32, at: (f32, f32), index: u32, seed: u32) -> DensePoint {
         let mut point = DensePoint { triangle, at, ..DensePoint::default() };
         let footprint = FootprintPoint { triangle, at, offset: Vec2::splat(0.5) };
-        let receiver = receiver(self.scene, &footprint);
+        let receiver = receiver(self.sources.scene, &footprint);
         let sequence = Sequence::new(seed, Stream::ResolutionLight, index);
         point.rays += u64::from(OPEN_TEST_RAYS);
         point.counts = self.is_open(&receiver, sequence);
@@ -149,7 +143,7 @@ impl PointBaker<'_> {
         let hits_inside = |ray: &u32| {
             let [u, v, ..] = sequence.point(*ray, 0);
             let direction = cosine_about(receiver.geometric_normal, u, v);
-            let hit = self.scene.classify_hit(receiver.origin, direction);
+            let hit = self.sources.scene.classify_hit(receiver.origin, direction);
             matches!(hit, SurfaceHit::Inside | SurfaceHit::Back)
         };
         2 * (0..OPEN_TEST_RAYS).filter(hits_inside).count() < OPEN_TEST_RAYS as usize
@@ -159,8 +153,7 @@ impl PointBaker<'_> {
 /// Compares the finished map with the points. `variances` is the map's own estimate of its squared sampling error, per
 /// texel; NaN where nothing is known.
 pub(crate) fn compare(
-    scene: &BakeScene,
-    layout: &LightmapLayout,
+    texels: &CoveredTexels<'_>,
     filled: &[Vec3],
     variances: &[f32],
     points: &[DensePoint],
@@ -177,7 +170,7 @@ pub(crate) fn compare(
     let excess = if excess.is_finite() { excess } else { Vec3::ZERO };
     let (mut mean, mut squares) = (0.0, Vec::with_capacity(points.len()));
     for point in counting() {
-        let Some((shown, variance)) = look_up(scene, layout, filled, variances, point) else { continue };
+        let Some((shown, variance)) = look_up(texels, filled, variances, point) else { continue };
         let light = [0, 1].map(|half| point.direct[half] + point.indirect[half] * (Vec3::ONE - excess));
         let [a, b] = light.map(|light| (light - shown).as_dvec3());
         squares.push((a * b).element_sum() / 3.0 - f64::from(variance));
@@ -200,14 +193,13 @@ pub(crate) fn compare(
 /// What the map shows at a point by bilinear filtering, and the variance of that, as if the texels' errors were
 /// independent.
 fn look_up(
-    scene: &BakeScene,
-    layout: &LightmapLayout,
+    texels: &CoveredTexels<'_>,
     filled: &[Vec3],
     variances: &[f32],
     point: &DensePoint,
 ) -> Option<(Vec3, f32)> {
-    let triangle = &scene.triangles[point.triangle as usize];
-    let map = &layout.maps[triangle.object as usize];
+    let triangle = &texels.scene.triangles[point.triangle as usize];
+    let map = &texels.layout.maps[triangle.object as usize];
     let at = triangle.place_on_map(point.at) - 0.5;
     if !at.is_finite() {
         return None;

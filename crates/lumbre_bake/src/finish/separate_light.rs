@@ -3,10 +3,9 @@
 use glam::Vec3;
 
 use super::fill::fill;
-use crate::cancel_token::CancelToken;
-use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::CoveredTexels;
 use crate::direct_light::DirectLight;
-use crate::final_gather::rounds::IndirectLight;
+use crate::final_gather::IndirectLight;
 
 /// The two parts of the irradiance, per texel of all maps, W/m²; NaN where nothing is known.
 pub(crate) struct Separate {
@@ -22,11 +21,10 @@ pub(crate) fn separate(
     (direct, bounced): (&DirectLight, &IndirectLight),
     finished: &[Vec3],
     rings: u32,
-    stop: &CancelToken,
 ) -> Separate {
     // The errors that come out are not used.
     let no_errors = vec![0.0; texels.list.len()];
-    let filled = |light: &[Vec3]| fill(texels, (light, &no_errors), rings, stop).0;
+    let filled = |light: &[Vec3]| fill(texels, (light, &no_errors), rings).0;
     let direct: Vec<Vec3> = direct.texels.iter().map(|direct| direct.baked).collect();
     let bounced = match bounced.light.is_empty() {
         true => vec![Vec3::ZERO; texels.list.len()],

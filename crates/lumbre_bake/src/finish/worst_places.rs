@@ -3,10 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec3, IVec3, Vec3};
+use glam::{DVec3, IVec3};
 
 use crate::WorstPlace;
-use crate::coverage::footprint::{Texel, receiver};
+use crate::bounds::Bounds;
+use crate::coverage::{Texel, receiver};
 use crate::scene::{BakeScene, SceneObject};
 
 /// Side of the cubes into which the level is divided, as a share of its longest side.
@@ -18,7 +19,7 @@ const MAX_OBJECTS: usize = 2;
 
 /// Sums over the texels in one cube.
 #[derive(Default)]
-struct Place {
+struct CubeErrors {
     texels: u32,
     position: DVec3,
     squares: f64,
@@ -35,10 +36,9 @@ pub(crate) fn worst_places(
     squares: &[f32],
     whole: f64,
 ) -> Vec<WorstPlace> {
-    let corners = || scene.triangles.iter().flat_map(|triangle| triangle.corners);
-    let (low, high) = corners().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
+    let Bounds { low, high } = scene.triangles.iter().flat_map(|triangle| triangle.corners).collect();
     let side = CUBE_SIDE * (high - low).max_element();
-    let mut places: BTreeMap<[i32; 3], Place> = BTreeMap::new();
+    let mut places: BTreeMap<[i32; 3], CubeErrors> = BTreeMap::new();
     let mut open = 0u32;
     for (texel, &square) in texels.iter().zip(squares).filter(|(texel, _)| !texel.is_hidden()) {
         let Some(point) = texel.point(scene, 0.5, 0.5) else { continue };
@@ -55,7 +55,7 @@ pub(crate) fn worst_places(
     // whole's.
     let all: f64 = places.values().map(|place| place.squares).sum();
     let scale = f64::from(open) * whole.powi(2) / all.max(f64::MIN_POSITIVE);
-    let worst_place = |place: Place| {
+    let worst_place = |place: CubeErrors| {
         let count = f64::from(place.texels);
         let error = (scale * place.squares / count).sqrt();
         let texels = count / f64::from(open);

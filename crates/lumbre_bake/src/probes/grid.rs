@@ -3,6 +3,7 @@
 use glam::{DVec3, UVec3, Vec3};
 use lumbre_scene::Transform;
 
+use crate::bounds::Bounds;
 use crate::scene::{BakeScene, Canonical};
 
 /// Most probes if no spacing is requested.
@@ -37,13 +38,9 @@ impl Grid {
         let solid = scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate);
         let corners = solid.flat_map(|triangle| triangle.corners).map(|corner| corner.as_dvec3());
         let moving = moving.iter().map(|&point| (point - scene.space.center) * scene.space.scale);
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for point in corners.chain(moving).filter(|point| point.is_finite()) {
-            (low, high) = (low.min(point), high.max(point));
-        }
-        if !low.cmple(high).all() {
-            (low, high) = (DVec3::ZERO, DVec3::ZERO);
-        }
+        let bounds: Bounds<DVec3> = corners.chain(moving).filter(|point| point.is_finite()).collect();
+        let (low, high) =
+            if bounds.is_empty() { (DVec3::ZERO, DVec3::ZERO) } else { (bounds.low, bounds.high) };
         let mut size = high - low;
         let least = if size.max_element() > 0.0 { MIN_THICKNESS * size.max_element() } else { 1.0 };
         let middle = 0.5 * low + 0.5 * high;

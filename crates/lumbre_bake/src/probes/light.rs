@@ -7,13 +7,12 @@ use glam::Vec3;
 use lumbre_scene::AmbientCube;
 
 use super::ProbeEffort;
-use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::radiance_cache::RadianceCache;
+use crate::denoise::REPLICATES;
+use crate::final_gather::RadianceCache;
 use crate::sampling::{Sequence, Stream, sphere_direction};
 use crate::scene::Receiver;
 use crate::scene::{BakeScene, SurfaceHit};
-use crate::sources::direct::Direct;
-use crate::sources::light_sources::Sources;
+use crate::sources::{Direct, Sources};
 
 /// Normals of a cube's sides, in the order of [`AmbientCube`].
 const SIDES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
@@ -118,7 +117,7 @@ impl ProbeLight<'_> {
                 SurfaceHit::Lit { triangle, side, at, .. } => {
                     self.cache.map_or(Vec3::ZERO, |cache| cache.leaving(triangle, side, at))
                 }
-                SurfaceHit::None => self.cache.map_or(Vec3::ZERO, |cache| cache.sky),
+                SurfaceHit::None => self.cache.map_or(Vec3::ZERO, |cache| cache.sources.sky),
                 SurfaceHit::Back | SurfaceHit::Inside => {
                     backs += 1;
                     Vec3::ZERO

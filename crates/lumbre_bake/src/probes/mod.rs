@@ -21,20 +21,22 @@ pub(crate) use light::ProbeSample;
 
 use self::grid::Grid;
 use crate::chunks::in_chunks_uncheckpointed;
-use crate::final_gather::radiance_cache::RadianceCache;
+use crate::final_gather::RadianceCache;
 use crate::monitor::BakeMonitor;
+use crate::report::StageNotes;
 use crate::scene::{BakeScene, StaticScene};
-use crate::sources::light_sources::Sources;
+use crate::sources::Sources;
 use crate::stage::Stage;
-use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
+use crate::{BakeError, BakeOptions, ProbeReport, Quality};
 
 /// An irradiance volume, and where it is.
 pub(crate) struct PlacedVolume {
     pub volume: IrradianceVolume,
     pub grid: Grid,
+    pub report: ProbeReport,
 }
 
-/// Bakes the probes. `None` if none are wanted or there is no light for them; the report then says why.
+/// Bakes the probes. `None` if none are wanted or there is no light for them; the notes then say why.
 pub(crate) fn bake(
     input: &StaticScene,
     scene: &BakeScene,
@@ -42,11 +44,9 @@ pub(crate) fn bake(
     cache: Option<&RadianceCache<'_>>,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<Option<PlacedVolume>, BakeError> {
+) -> Result<(Option<PlacedVolume>, StageNotes), BakeError> {
     if let Err(reason) = input.calls_for_probes(options) {
-        report.skipped.push(format!("probes: {reason}"));
-        return Ok(None);
+        return Ok((None, StageNotes::of_skipped(format!("probes: {reason}"))));
     }
     // The scene's surfaces are the input's primitives, in the same order.
     let lights_frames: Vec<bool> = input.primitives().map(|primitive| primitive.lights_frames).collect();
@@ -56,13 +56,12 @@ pub(crate) fn bake(
     };
     let emitters = sources.only_emitters(|emitter| !is_lit_in_real_time(emitter.triangle));
     if emitters.is_empty() && cache.is_none() {
-        report
-            .skipped
-            .push("probes: nothing bounces, and no face shines that is not lit in real time".into());
-        return Ok(None);
+        let why = "probes: nothing bounces, and no face shines that is not lit in real time";
+        return Ok((None, StageNotes::of_skipped(why)));
     }
-    monitor.stage(Stage::Probes, report)?;
-    let grid = Grid::new(scene, input.moving_points(), options.probe_spacing, &mut report.warnings);
+    monitor.stage(Stage::Probes)?;
+    let mut notes = StageNotes::default();
+    let grid = Grid::new(scene, input.moving_points(), options.probe_spacing, &mut notes.warnings);
     let clock = monitor.clock();
     let probes: Vec<ProbeSample> = in_chunks_uncheckpointed(grid.count(), monitor, |index| {
         // The volume must be complete, so that the remaining probes are sampled roughly once the time is up.
@@ -70,18 +69,18 @@ pub(crate) fn bake(
         let light = light::ProbeLight { scene, emitters: &emitters, cache, effort: effort(quality) };
         light.at(grid.position(index), options.seed, index as u32)
     })?;
-    report.rays += probes.iter().map(|probe| probe.rays).sum::<u64>();
+    notes.rays = probes.iter().map(|probe| probe.rays).sum::<u64>();
     let valid: Vec<bool> = probes.iter().map(|probe| !probe.inside).collect();
     let mut cubes: Vec<AmbientCube> = probes.iter().map(|probe| probe.cube).collect();
     fill::fill(grid.resolution, &valid, &mut cubes);
-    report.probes = ProbeReport {
+    let report = ProbeReport {
         resolution: grid.resolution.to_array(),
         spacing: grid.spacing(scene.space).to_array(),
         inside: valid.iter().filter(|valid| !**valid).count(),
         estimated_error: light::relative_error(&probes),
     };
-    if report.probes.inside == grid.count() {
-        report.warnings.push(
+    if report.inside == grid.count() {
+        notes.warnings.push(
             "every probe lies inside geometry and is dark; give a smaller probe spacing, or turn the faces \
              of the walls to the inside"
                 .into(),
@@ -89,7 +88,7 @@ pub(crate) fn bake(
     }
     let inside = if valid.contains(&false) { valid.iter().map(|valid| !valid).collect() } else { Vec::new() };
     let volume = IrradianceVolume { resolution: grid.resolution, cubes, inside };
-    Ok(Some(PlacedVolume { volume, grid }))
+    Ok((Some(PlacedVolume { volume, grid, report }), notes))
 }
 
 /// Numbers of a probe's samples.

@@ -5,6 +5,7 @@
 
 use glam::{DMat2, DVec2};
 
+use crate::scene::mean_of_points::SubTriangle;
 use crate::visibility::clipping::{clip, clip_segment};
 
 /// An inner node: a line, and the children on its two sides.
@@ -23,15 +24,12 @@ struct BspChild(u32);
 
 const PIECE_FLAG: u32 = 1 << 31;
 
-/// Corners of a piece as barycentric weights of its triangle's second and third vertex.
-pub(crate) type Corners = [(f32, f32); 3];
-
 /// The trees of all cells that are cut.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BspTrees {
     nodes: Vec<BspNode>,
     /// The pieces, cell by cell.
-    pub pieces: Vec<Corners>,
+    pub pieces: Vec<SubTriangle>,
     /// How many cells are crossed by more lines than may cut them.
     pub full: usize,
 }
@@ -275,7 +273,7 @@ mod tests {
     const CELL: [DVec2; 3] = [DVec2::ZERO, DVec2::new(2.0, 0.0), DVec2::new(0.0, 2.0)];
 
     /// Area of a piece as a share of the triangle's.
-    fn area_share([a, b, c]: Corners) -> f64 {
+    fn area_share([a, b, c]: SubTriangle) -> f64 {
         f64::from((b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1))
     }
 

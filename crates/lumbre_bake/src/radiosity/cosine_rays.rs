@@ -3,10 +3,10 @@
 
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
+use super::ray_counts::{PatchRayCounts, counted};
 use crate::BakeError;
 use crate::chunks::in_chunks;
 use crate::monitor::BakeMonitor;
-use crate::radiosity::ray_counts::{PatchRayCounts, counted};
 use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
 use crate::scene::{BakeScene, SurfaceHit};
 
@@ -17,9 +17,6 @@ const MAX_RAYS: u32 = 65_536;
 const LATE_RAYS: u32 = 16;
 
 /// Casts about `rays` rays, in proportion to the patches' areas. Returns the counts per patch, and the number of rays.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn cast(
     scene: &BakeScene,
     patches: &Patches,

@@ -15,12 +15,12 @@ use crate::chunks::in_chunks;
 use crate::color::wide_channel_mean;
 use crate::monitor::BakeMonitor;
 use crate::options::Solver;
+use crate::report::StageNotes;
 use crate::sampling::{Sequence, Stream, triangle_point};
-use crate::scene::material::Side;
-use crate::scene::{BakeScene, Receiver};
-use crate::sources::light_sources::Sources;
+use crate::scene::{BakeScene, Receiver, Side};
+use crate::sources::Sources;
 use crate::stage::Stage;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::{BakeError, BakeOptions};
 
 /// The light of all patches, which the final gather reads.
 pub(crate) struct Exchange {
@@ -33,11 +33,24 @@ pub(crate) struct Exchange {
     /// estimate of the error by the patches' size.
     pub indirect_error: Vec<Vec2>,
     /// Per patch, the distance below which it is too coarse to be read, canonical units.
-    pub near: Vec<f32>,
+    pub min_read_distance: Vec<f32>,
     /// Where each patch's light by bounces comes from.
     pub guide: SamplingGuide,
     /// Light that leaves each patch, without its emission, W/m².
     pub exitance: Vec<Vec3>,
+    /// Bound of the solver's error, relative to the light by bounces.
+    pub residual_bound: f64,
+}
+
+/// The figures of the exchange of light, as in [`BakeReport`](crate::BakeReport).
+#[derive(Debug, Default)]
+pub(crate) struct ExchangeReport {
+    pub patches: usize,
+    pub form_factors: usize,
+    pub energy_lost: f64,
+    pub iterations: [u32; 3],
+    pub residual: f64,
+    pub residual_bound: f64,
 }
 
 /// How finely the exchange of light is computed.
@@ -47,6 +60,8 @@ pub(crate) struct Resolution {
     pub patch_side: f32,
     /// Rays for all form factors together.
     pub form_factor_rays: usize,
+    /// Upper estimate of the bytes that the bake then needs.
+    pub memory_bytes: u64,
 }
 
 /// Relative residual at which the solver stops: well below the error of the form factors.
@@ -55,57 +70,62 @@ const TOLERANCE: f64 = 1e-5;
 /// Shadow rays from a patch to each source, for each of two halves.
 const SHADOW_RAYS: u32 = 8;
 
+/// The exchange with the form factors, if anything bounces; its figures; and notes.
+type ExchangeResult = ((Option<(Exchange, FormFactors)>, ExchangeReport), StageNotes);
+
 impl Exchange {
     /// Returns the form factors as well, by which `rebake` estimates what changes since a former bake do to the light.
-    /// `None` where nothing bounces; the report then says why. `known_direct` returns each patch's direct irradiance by
+    /// `None` where nothing bounces; the notes then say why. `known_direct` returns each patch's direct irradiance by
     /// two independent halves of samples, or `None` for patches of which it is not known: those cast shadow rays.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn new(
-        scene: &BakeScene,
         sources: &Sources<'_>,
         options: &BakeOptions,
         resolution: Resolution,
         known_direct: impl FnOnce(&Patches) -> Vec<Option<[Vec3; 2]>>,
         monitor: &mut BakeMonitor<'_>,
-        report: &mut BakeReport,
-    ) -> Result<Option<(Self, FormFactors)>, BakeError> {
+    ) -> Result<ExchangeResult, BakeError> {
+        let (scene, mut report, mut notes) =
+            (sources.scene, ExchangeReport::default(), StageNotes::default());
         let side = resolution.patch_side;
-        monitor.stage(Stage::FormFactors, report)?;
+        monitor.stage(Stage::FormFactors)?;
         let patches = monitor.run_interruptible(0.0, || Patches::new(scene, side))?;
         report.patches = patches.list.len();
-        report.warnings.extend(patches.warnings.iter().cloned());
+        notes.warnings.extend(patches.warnings.iter().cloned());
         if patches.list.iter().all(|patch| patch.reflectance == Vec3::ZERO) {
-            report.skipped.push(why_black_scene_is_skipped(sources).into());
+            notes.skipped.push(why_black_scene_is_skipped(sources).into());
             let black = || sources.has_sky().then(|| Self::black(scene, patches, side));
-            return monitor.run_interruptible(0.5, black);
+            return Ok(((monitor.run_interruptible(0.5, black)?, report), notes));
         }
         let (method, rays) = (options.form_factors, resolution.form_factor_rays);
         let (factors, halves) = FormFactors::sample(scene, &patches, method, rays, options.seed, monitor)?;
-        report.rays += factors.rays;
+        notes.rays += factors.rays;
         report.form_factors = factors.columns.len();
         report.energy_lost = factors.energy_lost;
 
-        monitor.stage(Stage::Radiosity, report)?;
+        monitor.stage(Stage::Radiosity)?;
         let known = monitor.run_interruptible(0.1, || known_direct(&patches))?;
         let open = factors.open.as_slice();
         let (direct_halves, rays) = direct_halves(sources, &patches, open, &known, options.seed, monitor)?;
-        report.rays += rays;
+        notes.rays += rays;
         let [even, odd] = &direct_halves;
         let direct: Vec<Vec3> = even.iter().zip(odd).map(|(even, odd)| 0.5 * (*even + *odd)).collect();
         let is_dark = |(direct, patch): (&Vec3, &Patch)| *direct * patch.reflectance == Vec3::ZERO;
         if !sources.has_sky() && direct.iter().zip(&patches.list).all(is_dark) {
-            report
-                .skipped
-                .push("radiosity and final gather: no light reaches a surface that reflects".into());
-            return Ok(None);
+            notes.skipped.push("radiosity and final gather: no light reaches a surface that reflects".into());
+            return Ok(((None, report), notes));
         }
         monitor.advance(0.5)?;
         let sky = sky_irradiance(&factors, sources);
         let indirect = monitor.run_interruptible(0.5, || {
-            solve(options.solver, &factors, &patches.list, &direct, &sky, report)
+            solve(options.solver, &factors, &patches.list, &direct, &sky, &mut report)
         })?;
+        if report.residual > 2.0 * TOLERANCE {
+            notes.warnings.push(format!(
+                "the radiosity system was solved to a residual of {:.1e} only, after {} iterations; {TOLERANCE:.0e} was wanted",
+                report.residual,
+                report.iterations.into_iter().max().unwrap_or_default()
+            ));
+        }
         let noise = monitor.run_interruptible(0.6, || {
             let sky_halves = halves.each_ref().map(|factors| sky_irradiance(factors, sources));
             sampling_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list)
@@ -124,8 +144,18 @@ impl Exchange {
             let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
             SamplingGuide::new(scene, &patches, side, &factors, &radiosity, &sky)
         })?;
-        let near = patches.near_distances(scene, side);
-        Ok(Some((Self { patches, direct, indirect, indirect_error, near, guide, exitance }, factors)))
+        let min_read_distance = patches.min_read_distances(scene, side);
+        let exchange = Self {
+            patches,
+            direct,
+            indirect,
+            indirect_error,
+            min_read_distance,
+            guide,
+            exitance,
+            residual_bound: report.residual_bound,
+        };
+        Ok(((Some((exchange, factors)), report), notes))
     }
 }
 
@@ -156,10 +186,11 @@ impl Exchange {
             direct: dark.clone(),
             indirect: dark.clone(),
             indirect_error: vec![Vec2::ZERO; count],
-            near: patches.near_distances(scene, side),
+            min_read_distance: patches.min_read_distances(scene, side),
             patches,
             guide,
             exitance: dark,
+            residual_bound: 0.0,
         };
         (exchange, factors)
     }
@@ -273,7 +304,7 @@ fn solve(
     patches: &[Patch],
     direct: &[Vec3],
     sky: &[Vec3],
-    report: &mut BakeReport,
+    report: &mut ExchangeReport,
 ) -> Vec<Vec3> {
     let first: Vec<Vec3> = direct.iter().zip(sky).map(|(direct, sky)| *direct + *sky).collect();
     let channels: Vec<(Vec<f64>, u32, f64)> = (0..3)
@@ -293,13 +324,6 @@ fn solve(
         report.residual = report.residual.max(*residual);
     }
     report.residual_bound = report.residual / (1.0 - largest);
-    if report.residual > 2.0 * TOLERANCE {
-        report.warnings.push(format!(
-            "the radiosity system was solved to a residual of {:.1e} only, after {} iterations; {TOLERANCE:.0e} was wanted",
-            report.residual,
-            report.iterations.into_iter().max().unwrap_or_default()
-        ));
-    }
     let [red, green, blue] = [0, 1, 2].map(|channel| &channels[channel].0);
     (0..patches.len()).map(|i| sky[i] + DVec3::new(red[i], green[i], blue[i]).as_vec3()).collect()
 }

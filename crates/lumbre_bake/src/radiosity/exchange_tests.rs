@@ -7,15 +7,15 @@ use std::path::Path;
 use bevy_ecs::world::World;
 use glam::Vec3;
 
-use super::exchange::{Exchange, Resolution};
+use super::exchange::{Exchange, ExchangeReport, Resolution};
 use super::patches::Patches;
 use crate::monitor::BakeMonitor;
 use crate::options::Solver;
 use crate::scene::from_world;
 use crate::scene::laid_out::laid_out;
+use crate::sources::Sources;
 use crate::sources::emitters::emitters;
-use crate::sources::light_sources::Sources;
-use crate::{BakeOptions, BakeReport, Density, Quality};
+use crate::{BakeOptions, Density, Quality};
 
 pub(crate) const MODELS: [&str; 2] = ["models/cornell_box.glb", "conformance/bake/alcove.glb"];
 
@@ -32,7 +32,7 @@ pub(crate) fn model(name: &str) -> Option<World> {
 }
 
 /// The irradiance by bounces of all patches, and the report.
-fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
+fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, ExchangeReport) {
     let options = BakeOptions {
         density: Density::MapSize(16),
         quality: Quality::Draft,
@@ -44,12 +44,12 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
     let sources = Sources::new(&scene, emitters(&scene), input.lights, input.sky);
     let mut carry_on = |_| ControlFlow::Continue(());
     let mut monitor = BakeMonitor::new(&mut carry_on, None);
-    let mut report = BakeReport::default();
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
-    let resolution = Resolution { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000 };
+    let resolution =
+        Resolution { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000, memory_bytes: 0 };
     let none_known = |_: &Patches| Vec::new();
-    let exchange =
-        Exchange::new(&scene, &sources, &options, resolution, none_known, &mut monitor, &mut report).unwrap();
+    let ((exchange, report), _) =
+        Exchange::new(&sources, &options, resolution, none_known, &mut monitor).unwrap();
     (exchange.expect("light bounces").0.indirect, report)
 }
 

@@ -3,7 +3,7 @@
 //! share of the patch's rays that hit a surface, which is an estimate of the exact sum (1 in a closed scene). Rays are
 //! counted in `cosine_rays` and `global_lines`; the linear system is solved in `solver`.
 
-use crate::radiosity::ray_counts::{Counts, PatchRayCounts, merged};
+use super::ray_counts::{Counts, PatchRayCounts, merged};
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -42,9 +42,6 @@ pub(crate) struct FormFactors {
 impl FormFactors {
     /// Samples with about `rays` rays or lines. Returns the estimate from all of them and those from two halves: half
     /// the difference of these has the standard deviation of the error of the former.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
     pub fn sample(
         scene: &BakeScene,
         patches: &Patches,
@@ -109,6 +106,14 @@ impl FormFactors {
             .collect();
         factors.scale_rows(&row_sums);
         factors
+    }
+
+    /// Appends a row: pairs of a patch, ascending, and the exchange area.
+    pub fn push_row(&mut self, row: Vec<(PatchIndex, f32)>) {
+        let (columns, exchange): (Vec<PatchIndex>, Vec<f32>) = row.into_iter().unzip();
+        self.columns.extend(columns);
+        self.exchange.extend(exchange);
+        self.starts.push(self.columns.len());
     }
 
     /// The entries of row i: (j, G_ij).
@@ -207,11 +212,7 @@ fn pool(counts: &[Counts], areas: Vec<f32>, stop: &CancelToken) -> FormFactors {
     for first in (0..counts.len()).step_by(ROW_BATCH) {
         let places = first..(first + ROW_BATCH).min(counts.len());
         let rows: Vec<_> = places.into_par_iter().map(|i| row(PatchIndex::new(i))).collect();
-        for row in rows {
-            factors.columns.extend(row.iter().map(|entry| entry.0));
-            factors.exchange.extend(row.iter().map(|entry| entry.1));
-            factors.starts.push(factors.columns.len());
-        }
+        rows.into_iter().for_each(|row| factors.push_row(row));
     }
     factors
 }

@@ -13,13 +13,13 @@ use serde::{Deserialize, Serialize};
 use super::cosine_rays::{self, MIN_RAYS};
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
+use super::ray_counts::{PatchRayCounts, counted};
 use crate::BakeError;
+use crate::bounds::Bounds;
 use crate::chunks::{in_chunks, in_chunks_until_deadline};
 use crate::monitor::BakeMonitor;
-use crate::radiosity::ray_counts::{PatchRayCounts, counted};
 use crate::sampling::{Sequence, Stream, cosine_direction, frame, sphere_direction};
-use crate::scene::BakeScene;
-use crate::scene::crossings::Face;
+use crate::scene::{BakeScene, Face};
 
 /// Lines that are cast together, as one value of a list that is computed in chunks.
 const BATCH: u32 = 64;
@@ -51,9 +51,6 @@ impl LineEnd {
 
 /// Casts as many lines as take about the time of `rays` rays. Returns the counts per patch, and the number of lines and
 /// of the rays from small patches together.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
 pub(crate) fn cast(
     scene: &BakeScene,
     patches: &Patches,
@@ -90,9 +87,7 @@ struct Lines {
 impl Lines {
     fn new(scene: &BakeScene, seed: u32) -> Self {
         let corners = || scene.triangles.iter().filter(|t| !t.is_hidden_duplicate).flat_map(|t| t.corners);
-        let (low, high) = corners().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), corner| {
-            (low.min(corner), high.max(corner))
-        });
+        let Bounds { low, high } = corners().collect();
         let center = 0.5 * (low + high);
         let radius = corners().map(|corner| (corner - center).length()).fold(0.0, f32::max);
         let halves = [0, 1].map(|half| Sequence::new(seed, Stream::GlobalLines(half), 0));

@@ -20,8 +20,8 @@ use crate::options::{FormFactorMethod, Solver};
 use crate::sampling::{Sequence, Stream};
 use crate::scene::from_world;
 use crate::scene::laid_out::laid_out;
+use crate::sources::Sources;
 use crate::sources::emitters::emitters;
-use crate::sources::light_sources::Sources;
 use crate::{BakeError, BakeOptions, Density, Quality};
 
 /// The two methods.

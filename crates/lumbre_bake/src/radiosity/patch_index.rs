@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// A patch, by its place among all patches of one subdivision of the scene. Lists "per patch", and the rows and columns
 /// of the form factors, are in this order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub(crate) struct PatchIndex(pub u32);
 
 impl PatchIndex {

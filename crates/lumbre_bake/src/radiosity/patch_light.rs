@@ -5,11 +5,9 @@
 use glam::{DVec3, Vec2, Vec3};
 
 use super::patches::Patches;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Footprint, Texel, barycentric};
+use crate::coverage::{CoveredTexels, Footprint, Texel, barycentric};
 use crate::direct_light::DirectLight;
-use crate::scene::BakeScene;
-use crate::scene::material::Side;
+use crate::scene::{BakeScene, Side};
 
 /// Fewest texels that a patch's light is computed from, in each half of them. The share of fewer texels that lies
 /// beyond the patch's border would be too large.
@@ -19,7 +17,6 @@ const MIN_TEXELS: f64 = 2.0;
 /// chessboard. `None` where there are too few texels. Texels that walls divide are left out, since they hold the light
 /// of both sides of the wall.
 pub(crate) fn patch_light(
-    scene: &BakeScene,
     texels: &CoveredTexels<'_>,
     direct: &DirectLight,
     patches: &Patches,
@@ -30,7 +27,7 @@ pub(crate) fn patch_light(
     let undivided = texels.list.iter().zip(&direct.texels).zip(divided).filter(|(_, divided)| !divided);
     for ((texel, direct), _) in undivided {
         let (half, light) = (((texel.x + texel.y) & 1) as usize, direct.total().as_dvec3());
-        for_each_point(scene, texel, |triangle, at, share| {
+        for_each_point(texels.scene, texel, |triangle, at, share| {
             if let Some(patch) = patches.at(triangle, Side::Front, at) {
                 let (sum, weight) = &mut sums[patch.place()][half];
                 *sum += light * share;
@@ -78,14 +75,14 @@ mod tests {
     use lumbre_optics::{BakeMode, Light};
 
     use super::*;
-    use crate::coverage::footprint::{FootprintPoint, receiver};
+    use crate::coverage::{FootprintPoint, receiver};
     use crate::direct_light::direct_light;
     use crate::monitor::BakeMonitor;
     use crate::sampling::{Sequence, Stream, triangle_point};
     use crate::scene::laid_out::laid_out;
     use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
-    use crate::sources::light_sources::Sources;
-    use crate::{BakeOptions, BakeReport, Density};
+    use crate::sources::Sources;
+    use crate::{BakeOptions, Density};
 
     /// For a block in a room under a lamp, the light of patches by texels agrees with that by 1,024 rays to the lamp
     /// from each patch.
@@ -108,11 +105,11 @@ mod tests {
         let (layout, scene) = laid_out(&input.objects, input.space(), &options);
         let sources = Sources::new(&scene, Vec::new(), input.lights.clone(), Vec3::ZERO);
         let mut carry_on = |_| ControlFlow::Continue(());
-        let (mut monitor, mut report) = (BakeMonitor::new(&mut carry_on, None), BakeReport::default());
-        let texels = CoveredTexels::new(&scene, &layout, &mut monitor, &mut report).unwrap();
-        let direct = direct_light(&sources, &texels, &[], &options, &mut monitor, &mut report).unwrap();
+        let mut monitor = BakeMonitor::new(&mut carry_on, None);
+        let (texels, _) = CoveredTexels::new(&scene, &layout, &mut monitor).unwrap();
+        let (direct, _) = direct_light(&sources, &texels, &[], &options, &mut monitor).unwrap();
         let patches = Patches::new(&scene, 6.0 * texels.side);
-        let light = patch_light(&scene, &texels, &direct, &patches);
+        let light = patch_light(&texels, &direct, &patches);
 
         let (mut known, mut squares, mut sum) = (0.0, 0.0, 0.0);
         for (index, (patch, light)) in patches.list.iter().zip(&light).enumerate() {

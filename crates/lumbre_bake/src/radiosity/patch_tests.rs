@@ -11,8 +11,7 @@ use super::form_factor_tests::{scene, square};
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::sampling::{Sequence, Stream, triangle_point};
-use crate::scene::BakeScene;
-use crate::scene::material::Side;
+use crate::scene::{BakeScene, Side};
 
 /// Checks that the patches cover all surfaces, that each point of a patch is found in it, and that no patch of the
 /// floor (the first object) lies on both sides of a contact line; `side_of_line` returns different numbers for the

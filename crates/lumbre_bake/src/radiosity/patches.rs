@@ -1,21 +1,18 @@
-//! Patches: the pieces of surface over which radiosity is constant. Each triangle is divided into n² equal cells, so
-//! that the patch at a ray's hit is found by arithmetic; cells that other surfaces stand on or pass through are cut
-//! further along those contact lines. The light of patches is computed in `form_factors` and `solver`.
+//! Patches: the pieces of surface over which radiosity is constant. They are the cells of triangles, or pieces of cut
+//! cells: `triangle_cells` divides the triangles. The light of patches is computed in `form_factors` and `solver`.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use std::collections::BTreeMap;
 
-use glam::{DMat2, DVec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
-use super::bsp::{BspTrees, Corners, CutCell};
+use super::bsp::BspTrees;
 use super::patch_index::PatchIndex;
-use crate::scene::mean_of_points::mean_of_points;
-use crate::visibility::contacts::{PlaneFrame, contacts};
-
-use crate::scene::material::{ShownTexels, Side};
-use crate::scene::{BakeScene, SceneTriangle};
+use super::triangle_cells::{CORNERS, TriangleCells, cell_at, point_in_row, row_of_cell};
+use crate::scene::mean_of_points::{SubTriangle, mean_of_points};
+use crate::scene::{BakeScene, SceneTriangle, ShownTexels, Side};
 
 /// One side of one piece of a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -279,7 +276,7 @@ impl Patches {
 impl Patches {
     /// Per patch, the distance below which it is too coarse to be treated as uniformly bright, canonical units: twice
     /// the length of its side, which is at most `side`.
-    pub fn near_distances(&self, scene: &BakeScene, side: f32) -> Vec<f32> {
+    pub fn min_read_distances(&self, scene: &BakeScene, side: f32) -> Vec<f32> {
         let of_patch = |patch: &Patch| {
             let [a, b, c] = self.corners(scene, patch);
             let longest = (b - a).length().max((c - b).length()).max((a - c).length());
@@ -302,126 +299,14 @@ impl Patches {
 /// A patch is too coarse within this many times the length of its side.
 const NEAR_SIDES: f32 = 2.0;
 
-/// The cells of a triangle, and how contact lines cut some of them.
-struct TriangleCells {
-    /// Cells along each edge.
-    divisions: u32,
-    /// The numbers of the cells that are cut, ascending, and their pieces.
-    cut: Vec<(u32, CutCell)>,
-}
-
-impl TriangleCells {
-    /// Adds the trees of cut cells to `trees`.
-    fn new(scene: &BakeScene, index: usize, side: f32, trees: &mut BspTrees) -> Self {
-        let divisions = divisions(&scene.triangles[index], side);
-        Self { divisions, cut: cut_cells(scene, index, divisions, side, trees) }
-    }
-
-    /// Number of cells, cut or not.
-    fn count(&self) -> u32 {
-        self.divisions * self.divisions
-    }
-
-    /// Number of patches on one side of the triangle.
-    fn patches_per_side(&self) -> u64 {
-        let added: u64 = self.cut.iter().map(|(_, cut)| u64::from(cut.count - 1)).sum();
-        u64::from(self.divisions).pow(2) + added
-    }
-}
-
-/// Cells along each edge of a triangle.
-fn divisions(triangle: &SceneTriangle, side: f32) -> u32 {
-    let [a, b, c] = triangle.corners;
-    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-    // As many as its area calls for; a sliver gets more, until its cells are at most four sides long.
-    let by_area = (triangle.area / (0.5 * side * side)).sqrt();
-    by_area.max(longest / (4.0 * side)).ceil().clamp(1.0, 1024.0) as u32
-}
-
-/// Cells are cut only if their area is at least this share of that of a patch of the requested size.
-const MIN_CUT_CELL: f32 = 0.125;
-
-/// Cuts the cells of a triangle along the contact lines of what stands on it; returns the cells that were cut,
-/// ascending.
-fn cut_cells(
-    scene: &BakeScene,
-    index: usize,
-    divisions: u32,
-    side: f32,
-    trees: &mut BspTrees,
-) -> Vec<(u32, CutCell)> {
-    let triangle = &scene.triangles[index];
-    let cells = divisions * divisions;
-    if triangle.area < MIN_CUT_CELL * 0.5 * side * side * cells as f32 {
-        return Vec::new();
-    }
-    let frame = PlaneFrame::new(triangle);
-    let segments = contacts(scene, index as u32, &frame, side);
-    let [a, b, c] = triangle.corners.map(|corner| frame.flat(corner.as_dvec3()));
-    let weights = DMat2::from_cols(b - a, c - a).inverse();
-    if segments.is_empty() || !weights.is_finite() {
-        return Vec::new();
-    }
-    // Pairs of a cell and a segment that may cross it.
-    let mut crossed: Vec<(u32, u32)> = Vec::new();
-    for (number, segment) in segments.iter().enumerate() {
-        cells_along(divisions, segment.map(|p| weights * (p - a)), |cell| {
-            crossed.push((cell, number as u32))
-        });
-    }
-    crossed.sort_unstable();
-    // The slots after those of the cells are for the pieces that cutting adds.
-    let mut free_slot = cells;
-    crossed
-        .chunk_by(|x, y| x.0 == y.0)
-        .filter_map(|crossings| {
-            let cell = crossings[0].0;
-            let corners = CORNERS.map(|(u, v)| {
-                let (u, v) = point_of_cell(divisions, cell, u, v);
-                a + (b - a) * f64::from(u) + (c - a) * f64::from(v)
-            });
-            let segments: Vec<[DVec2; 2]> =
-                crossings.iter().map(|&(_, number)| segments[number as usize]).collect();
-            let cut = trees.cut(corners, &segments, weights, (cell, free_slot))?;
-            free_slot += cut.count - 1;
-            Some((cell, cut))
-        })
-        .collect()
-}
-
-/// Calls `visit` for every cell that a segment, given in barycentric weights, may cross.
-fn cells_along(divisions: u32, [p, q]: [DVec2; 2], mut visit: impl FnMut(u32)) {
-    let n = f64::from(divisions);
-    let (p, q) = if p.x <= q.x { (p * n, q * n) } else { (q * n, p * n) };
-    let row = |x: f64| (x.max(0.0) as u32).min(divisions - 1);
-    for a in row(p.x)..=row(q.x) {
-        let [from, to] = [f64::from(a), f64::from(a + 1)].map(|x| {
-            let along = if q.x > p.x { ((x - p.x) / (q.x - p.x)).clamp(0.0, 1.0) } else { 0.0 };
-            p.y + (q.y - p.y) * along
-        });
-        let (from, to) = if q.x > p.x { (from.min(to), from.max(to)) } else { (p.y.min(q.y), p.y.max(q.y)) };
-        let last = divisions - 1 - a;
-        for b in (from.max(0.0) as u32).min(last)..=(to.max(0.0) as u32).min(last) {
-            let cell = a * (2 * divisions - a) + 2 * b;
-            visit(cell);
-            if b < last {
-                visit(cell + 1);
-            }
-        }
-    }
-}
-
-/// The corners of a patch in barycentric weights of its own.
-const CORNERS: Corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
-
 /// Area of a piece as a share of its triangle's.
-fn area_share(corners: &Corners) -> f32 {
+fn area_share(corners: &SubTriangle) -> f32 {
     let [a, b, c] = *corners;
     ((b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1)).abs()
 }
 
 /// The point of a triangle with the given corners at barycentric weights (u, v).
-fn point_between([a, b, c]: &Corners, u: f32, v: f32) -> (f32, f32) {
+fn point_between([a, b, c]: &SubTriangle, u: f32, v: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
 }
 
@@ -431,7 +316,7 @@ fn reflectance_and_texels(
     scene: &BakeScene,
     index: usize,
     side: Side,
-    corners: &Corners,
+    corners: &SubTriangle,
 ) -> (Vec3, Option<f32>) {
     let triangle = &scene.triangles[index];
     let surface = &scene.surfaces[triangle.surface as usize];
@@ -452,16 +337,6 @@ fn texture_points(texels: ShownTexels) -> f32 {
     texels.edge.min(FEW_TEXELS).max(texels.area.sqrt()).max(0.5 * texels.edge)
 }
 
-/// The number of the cell at a point. Row `a` holds 2(n - a) - 1 cells, so the rows before it hold a(2n - a).
-fn cell_at(divisions: u32, u: f32, v: f32) -> u32 {
-    let n = divisions as f32;
-    let (x, y) = (u.clamp(0.0, 1.0) * n, v.clamp(0.0, 1.0) * n);
-    let a = (x as u32).min(divisions - 1);
-    let b = (y as u32).min(divisions - 1 - a);
-    let beyond = (x - a as f32) + (y - b as f32) > 1.0 && b + a + 1 < divisions;
-    a * (2 * divisions - a) + 2 * b + u32::from(beyond)
-}
-
 /// The number of a cell or piece as [`Patch::cell`] stores it. A cell is stored as its row and its place in it, since
 /// finding the row takes a square root.
 fn packed(divisions: u32, cell: u32) -> u32 {
@@ -470,63 +345,4 @@ fn packed(divisions: u32, cell: u32) -> u32 {
     }
     let (row, place) = row_of_cell(divisions, cell);
     row << ROW_SHIFT | place
-}
-
-/// The row of a cell, and the cell's place in it.
-fn row_of_cell(divisions: u32, cell: u32) -> (u32, u32) {
-    let n = f64::from(divisions);
-    // The largest a with a(2n - a) <= cell.
-    let mut a = (n - (n * n - f64::from(cell)).max(0.0).sqrt()) as u32;
-    while a > 0 && a * (2 * divisions - a) > cell {
-        a -= 1;
-    }
-    while (a + 1) * (2 * divisions - a - 1) <= cell && a + 1 < divisions {
-        a += 1;
-    }
-    (a, cell - a * (2 * divisions - a))
-}
-
-/// Converts barycentric weights in a cell to those in its triangle.
-fn point_of_cell(divisions: u32, cell: u32, u: f32, v: f32) -> (f32, f32) {
-    let (row, place) = row_of_cell(divisions, cell);
-    point_in_row(divisions, row, place, u, v)
-}
-
-/// As [`point_of_cell`], for the cell at a place of row `a`.
-fn point_in_row(divisions: u32, a: u32, place: u32, u: f32, v: f32) -> (f32, f32) {
-    let b = place / 2;
-    let (x, y) = if place.is_multiple_of(2) {
-        (a as f32 + u, b as f32 + v)
-    } else {
-        // The upside-down cell between (a+1, b), (a+1, b+1) and (a, b+1).
-        (a as f32 + 1.0 - u, b as f32 + 1.0 - v)
-    };
-    (x / divisions as f32, y / divisions as f32)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_point_in_a_cell_is_found_in_that_cell() {
-        for divisions in [1, 2, 3, 7, 64] {
-            for cell in 0..divisions * divisions {
-                for at in [(1.0 / 3.0, 1.0 / 3.0), (0.1, 0.1), (0.8, 0.1), (0.1, 0.8)] {
-                    let (u, v) = point_of_cell(divisions, cell, at.0, at.1);
-                    assert!(u >= 0.0 && v >= 0.0 && u + v <= 1.0 + 1e-6);
-                    assert_eq!(cell_at(divisions, u, v), cell, "{divisions} {cell} {at:?}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn corners_and_edges_belong_to_a_cell() {
-        for divisions in [1, 2, 5] {
-            for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (1.0, 1.0)] {
-                assert!(cell_at(divisions, u, v) < divisions * divisions);
-            }
-        }
-    }
 }

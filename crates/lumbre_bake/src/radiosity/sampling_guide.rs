@@ -323,7 +323,7 @@ struct Head {
 }
 
 /// A column of a row, and the sum of the row's probabilities up to and including it; the last sum is 1.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Entry {
     column: u32,
     end: f32,
@@ -331,7 +331,7 @@ struct Entry {
 
 /// A part of a row to be searched. Its middle entry is read in advance, so that the cache misses of several samples
 /// overlap.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RowPart {
     /// Where the row begins in the list of all entries, and the number of its entries.
     begin: usize,
@@ -341,12 +341,6 @@ pub(crate) struct RowPart {
     last: u32,
     middle: u32,
     entry: Entry,
-}
-
-impl RowPart {
-    /// An empty part, of no row.
-    pub const NONE: Self =
-        Self { begin: 0, count: 0, first: 0, last: 0, middle: 0, entry: Entry { column: 0, end: 1.0 } };
 }
 
 /// Number of parts in each index of a row.
@@ -389,8 +383,7 @@ impl Rows {
         let Head { start: begin, count, .. } = self.heads[row as usize];
         let (first, last) = (index[at], index[at + 1]);
         let middle = first.midpoint(last);
-        let entry =
-            self.entries.get(begin + middle as usize).copied().unwrap_or(Entry { column: 0, end: 1.0 });
+        let entry = self.entries.get(begin + middle as usize).copied().unwrap_or_default();
         RowPart { begin, count, first, last, middle, entry }
     }
 

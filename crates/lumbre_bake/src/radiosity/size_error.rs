@@ -64,11 +64,7 @@ fn larger_factors(factors: &FormFactors, larger: &LargerPatches, areas: &[f64]) 
     let to_f32 =
         |row: Vec<(PatchIndex, f64)>| row.into_iter().map(|(larger, g)| (larger, g as f32)).collect();
     let rows: Vec<Vec<(PatchIndex, f32)>> = larger.rows(factors, |_, row| to_f32(row));
-    for row in rows {
-        coarse.columns.extend(row.iter().map(|entry| entry.0));
-        coarse.exchange.extend(row.iter().map(|entry| entry.1));
-        coarse.starts.push(coarse.columns.len());
-    }
+    rows.into_iter().for_each(|row| coarse.push_row(row));
     coarse.areas = areas.iter().map(|&area| area.max(f64::from(f32::MIN_POSITIVE)) as f32).collect();
     coarse
 }

@@ -16,6 +16,18 @@ pub(crate) struct Solution {
     pub residual: f64,
 }
 
+/// The radiosity system B = E + ρ F B of one channel, and how exactly to solve it.
+#[derive(Clone, Copy)]
+pub(crate) struct RadiosityEquation<'a> {
+    pub factors: &'a FormFactors,
+    pub reflectance: &'a [f64],
+    pub emission: &'a [f64],
+    /// Norm of the emission.
+    pub size: f64,
+    /// Residual at which to stop, relative to `size`.
+    pub tolerance: f64,
+}
+
 /// Limit of the iterations: more than any ρ <= 0.999 needs for a residual of 1e-12.
 pub(crate) const MAX_ITERATIONS: u32 = 30_000;
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::components::levels;
 use super::form_factors::FormFactors;
-use super::solution::{MAX_ITERATIONS, Solution, exchanged, gather, norm};
+use super::solution::{MAX_ITERATIONS, RadiosityEquation, Solution, exchanged, gather, norm};
 use super::stationary;
 use crate::conjugate_gradients::{self, System};
 use crate::options::Solver;
@@ -30,12 +30,11 @@ impl Solver {
         let (emission, residual_factor) = (&leveled, (components as f64).sqrt());
         let size = norm(factors, emission);
         let tolerance = tolerance / residual_factor;
+        let equation = RadiosityEquation { factors, reflectance, emission, size, tolerance };
         let mut solution = match self {
-            Self::Jacobi => stationary::jacobi(factors, reflectance, emission, tolerance, size),
-            Self::GaussSeidel => stationary::gauss_seidel(factors, reflectance, emission, tolerance, size),
-            Self::ConjugateGradients => {
-                by_conjugate_gradients(factors, reflectance, emission, tolerance, size)
-            }
+            Self::Jacobi => stationary::jacobi(&equation),
+            Self::GaussSeidel => stationary::gauss_seidel(&equation),
+            Self::ConjugateGradients => by_conjugate_gradients(&equation),
         };
         // A bound for the component with the largest residual.
         solution.residual *= residual_factor;
@@ -47,13 +46,8 @@ impl Solver {
     }
 }
 
-fn by_conjugate_gradients(
-    factors: &FormFactors,
-    reflectance: &[f64],
-    emission: &[f64],
-    tolerance: f64,
-    size: f64,
-) -> Solution {
+fn by_conjugate_gradients(equation: &RadiosityEquation<'_>) -> Solution {
+    let RadiosityEquation { factors, reflectance, emission, size, tolerance } = *equation;
     // Patches that reflect nothing have B = E: as known values they move to the right-hand side.
     let known: Vec<f64> =
         emission.iter().zip(reflectance).map(|(&e, &r)| if r > 0.0 { 0.0 } else { e }).collect();

@@ -2,19 +2,12 @@
 //! sweep adds one bounce, and Gauss and Seidel's (Cohen and Wallace, "Radiosity and Realistic Image Synthesis", 1993,
 //! chapter 5). They serve to check the default solver, conjugate gradients in `solver`, which takes fewer steps.
 
-use super::form_factors::FormFactors;
-use super::solution::{MAX_ITERATIONS, Solution, exchanged, gather, norm};
+use super::solution::{MAX_ITERATIONS, RadiosityEquation, Solution, exchanged, gather, norm};
 
-/// B ← E + ρ F B for all patches at once, until the residual is at most `tolerance` times `size`, the norm of the
-/// emission.
-pub(crate) fn jacobi(
-    factors: &FormFactors,
-    reflectance: &[f64],
-    emission: &[f64],
-    tolerance: f64,
-    size: f64,
-) -> Solution {
-    iterate(factors, emission, tolerance, size, |x| {
+/// B ← E + ρ F B for all patches at once.
+pub(crate) fn jacobi(equation: &RadiosityEquation<'_>) -> Solution {
+    let RadiosityEquation { factors, reflectance, emission, .. } = *equation;
+    iterate(equation, |x| {
         let gathered = gather(factors, x);
         for (i, value) in x.iter_mut().enumerate() {
             *value = emission[i] + reflectance[i] * gathered[i];
@@ -23,14 +16,9 @@ pub(crate) fn jacobi(
 }
 
 /// As [`jacobi`], but each patch reads the values that the same sweep has already updated.
-pub(crate) fn gauss_seidel(
-    factors: &FormFactors,
-    reflectance: &[f64],
-    emission: &[f64],
-    tolerance: f64,
-    size: f64,
-) -> Solution {
-    iterate(factors, emission, tolerance, size, |x| {
+pub(crate) fn gauss_seidel(equation: &RadiosityEquation<'_>) -> Solution {
+    let RadiosityEquation { factors, reflectance, emission, .. } = *equation;
+    iterate(equation, |x| {
         for i in 0..x.len() {
             let gathered = exchanged(factors, i, x) / f64::from(factors.areas[i]);
             x[i] = emission[i] + reflectance[i] * gathered;
@@ -39,13 +27,8 @@ pub(crate) fn gauss_seidel(
 }
 
 /// Repeats a sweep until the residual is small enough.
-fn iterate(
-    factors: &FormFactors,
-    emission: &[f64],
-    tolerance: f64,
-    size: f64,
-    sweep: impl Fn(&mut [f64]),
-) -> Solution {
+fn iterate(equation: &RadiosityEquation<'_>, sweep: impl Fn(&mut [f64])) -> Solution {
+    let RadiosityEquation { factors, emission, size, tolerance, .. } = *equation;
     let mut solution = Solution { radiosity: emission.to_vec(), iterations: 0, residual: f64::INFINITY };
     while solution.iterations < MAX_ITERATIONS && !factors.stop.is_cancelled() {
         let before = solution.radiosity.clone();

@@ -3,11 +3,12 @@
 
 use glam::Vec3;
 
+use crate::bounds::Bounds;
+
 /// The bounding box of a changed object as it was or as it is, canonical units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ChangedBox {
-    pub low: Vec3,
-    pub high: Vec3,
+    pub bounds: Bounds<Vec3>,
     /// For an object of the former scene: the least and the most light that left it, W/m². `None` for an object of the
     /// new scene.
     pub former_exitance: Option<[Vec3; 2]>,
@@ -16,11 +17,11 @@ pub(crate) struct ChangedBox {
 impl ChangedBox {
     /// Centre of the bounding sphere.
     pub fn center(&self) -> Vec3 {
-        0.5 * (self.low + self.high)
+        0.5 * (self.bounds.low + self.bounds.high)
     }
 
     /// Radius of the bounding sphere.
     pub fn radius(&self) -> f32 {
-        0.5 * (self.high - self.low).length()
+        0.5 * (self.bounds.high - self.bounds.low).length()
     }
 }

@@ -2,23 +2,20 @@
 //! bounding boxes before and after, and the lights. Their effect on the light is estimated in
 //! `direct_light_invalidation` and `indirect_change`.
 
-use super::fingerprints::bounds;
-use crate::rebake::changed_box::ChangedBox;
-use crate::rebake::fingerprints::{emission, layouts};
 use std::collections::HashMap;
 
 use glam::Vec3;
 
-use super::direct_light_invalidation::shadowed;
-use super::fingerprints::{fingerprint, first_triangles};
-use super::samples::{Content, ObjectSamples, Samples, TexelSamples};
+use super::changed_box::ChangedBox;
+use super::direct_light_invalidation::{ShadowVolumes, shadowed};
+use super::fingerprints::{bounds, emission, fingerprint, first_triangles, layouts};
+use super::samples::{Content, ObjectSamples, TexelSamples};
 use crate::content_hash::{ContentHash, Hashes};
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::Texel;
-use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject, StaticScene, density_of};
-use crate::sources::direct::Direct;
-use crate::sources::light_sources::Sources;
-use crate::{BakeOptions, BakeReport, RebakeReport};
+use crate::coverage::CoveredTexels;
+use crate::final_gather::ReusedGather;
+use crate::scene::{Canonical, SceneObject, density_of};
+use crate::sources::{Direct, Sources};
+use crate::{BakeOptions, RebakeReport};
 
 /// With more changed objects than this the whole scene is baked.
 const MAX_CHANGED: usize = 64;
@@ -27,72 +24,37 @@ const MAX_CHANGED: usize = 64;
 const DENSITY_SLACK: f64 = 0.05;
 const CENTER_SLACK: f64 = 0.25;
 
-/// A former bake whose samples can be used, and the layout parameters to take over from it.
-pub(crate) struct ReusableBake<'a> {
-    pub former: &'a Content,
-    pub space: Canonical,
-    pub density: f64,
-}
-
-impl<'a> ReusableBake<'a> {
-    /// Checks whether the samples of a former bake can be used; if not, the report says why.
-    pub fn of(
-        samples: Option<&'a Samples>,
-        hashes: &Hashes,
-        input: &StaticScene,
-        options: &BakeOptions,
-        report: &mut BakeReport,
-    ) -> Option<Self> {
-        match Self::new(samples?, hashes, &input.objects, input.space(), options) {
-            Ok(reusable) => Some(reusable),
-            Err(reason) => {
-                report.rebake = Some(RebakeReport { whole: reason, ..RebakeReport::default() });
-                None
-            }
-        }
-    }
-
-    /// `space` is the one that a bake without samples would use.
+impl Content {
+    /// Whether a bake can use these samples of a former one. `space` is the one that it would use without them.
     ///
     /// # Errors
-    /// Why the samples cannot be used.
-    fn new(
-        samples: &'a Samples,
+    /// Why it cannot.
+    pub fn check_use(
+        &self,
         hashes: &Hashes,
         objects: &[SceneObject],
         space: Canonical,
         options: &BakeOptions,
-    ) -> Result<Self, String> {
-        let former = &samples.0;
-        if former.sampling != hashes.sampling {
+    ) -> Result<(), String> {
+        if self.sampling != hashes.sampling {
             return Err(
                 "the former bake had other options (error, density, quality, seed, …) or another version of the baker".into()
             );
         }
-        let moved = ((space.center - former.space.center) * former.space.scale).abs().max_element();
-        if space.scale != former.space.scale || moved > CENTER_SLACK {
+        let moved = ((space.center - self.space.center) * self.space.scale).abs().max_element();
+        if space.scale != self.space.scale || moved > CENTER_SLACK {
             return Err("the scene is larger or smaller than it was, or somewhere else".into());
         }
-        let new = count_missing(&hashes.objects, former.objects.iter().map(|object| &object.hash));
-        let gone = count_missing(former.objects.iter().map(|object| &object.hash), &hashes.objects);
+        let new = count_missing(&hashes.objects, self.objects.iter().map(|object| &object.hash));
+        let gone = count_missing(self.objects.iter().map(|object| &object.hash), &hashes.objects);
         if new.max(gone) > MAX_CHANGED {
             return Err(format!("{} objects have changed or moved", new.max(gone)));
         }
-        let density = density_of(objects, former.space, options);
-        if (density / former.density - 1.0).abs() > DENSITY_SLACK {
+        let density = density_of(objects, self.space, options);
+        if (density / self.density - 1.0).abs() > DENSITY_SLACK {
             return Err("the density follows the scene's area, which has changed".into());
         }
-        Ok(Self { former, space: former.space, density: former.density })
-    }
-
-    /// The identity of a bake of `content` that keeps these samples. It is the former one if nothing has changed: then
-    /// everything is kept, with the same bits.
-    pub fn identity(&self, content: ContentHash) -> ContentHash {
-        if self.former.content == content {
-            self.former.identity
-        } else {
-            content.made_from(&self.former.identity)
-        }
+        Ok(())
     }
 }
 
@@ -122,6 +84,8 @@ pub(crate) struct Changes<'a> {
     pub changed: Vec<bool>,
     /// Of changed objects, before and after.
     pub boxes: Vec<ChangedBox>,
+    /// Where these may block light, or may have blocked it.
+    pub shadow_volumes: ShadowVolumes,
     /// Whether lights, the sky or emissive surfaces have changed, so that direct light may differ everywhere.
     pub lights_changed: bool,
     /// What has changed, for the report.
@@ -137,14 +101,12 @@ pub(crate) struct Changes<'a> {
 impl<'a> Changes<'a> {
     /// Compares a scene with that of a former bake.
     pub fn find(
-        reusable: &ReusableBake<'a>,
+        former: &'a Content,
         hashes: &Hashes,
         objects: &[SceneObject],
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
     ) -> Self {
-        let (scene, former) = (sources.scene, reusable.former);
-        let CoveredTexels { layout, list: texels, charts, .. } = texels;
         let mut by_hash: HashMap<ContentHash, Vec<&'a ObjectSamples>> = HashMap::new();
         // Lists are in reverse order, so that of several equal objects the first is popped first.
         for object in former.objects.iter().rev() {
@@ -154,7 +116,7 @@ impl<'a> Changes<'a> {
         let unchanged: Vec<Option<&'a ObjectSamples>> = hashes
             .objects
             .iter()
-            .zip(layouts(scene, layout))
+            .zip(layouts(texels))
             .map(|(hash, layout)| by_hash.get_mut(hash)?.pop_if(|object| object.layout == layout))
             .collect();
         let gone: Vec<&ObjectSamples> = former
@@ -163,43 +125,38 @@ impl<'a> Changes<'a> {
             .filter(|object| !unchanged.iter().flatten().any(|other| std::ptr::eq(*other, *object)))
             .collect();
         let changed: Vec<bool> = unchanged.iter().map(Option::is_none).collect();
-        let emission = emission(scene, sources, layout);
+        let emission = emission(sources, texels);
         let differs = |(emission, former): (&u32, &Option<&ObjectSamples>)| {
             *emission != former.map_or(0, |former| former.emission)
         };
         let emitters_changed =
             emission.iter().zip(&unchanged).any(differs) || gone.iter().any(|gone| gone.emission != 0);
         let lights_or_sky_changed = former.lights != hashes.lights;
-        let bounds = bounds(scene, layout);
-        let after = (0..objects.len()).filter(|&object| changed[object]).map(|object| {
-            let (low, high) = bounds[object];
-            ChangedBox { low, high, former_exitance: None }
-        });
-        let before = gone.iter().map(|object| ChangedBox {
-            low: object.low,
-            high: object.high,
-            former_exitance: Some(object.exitance),
-        });
-        let boxes: Vec<ChangedBox> = after.chain(before).filter(|b| b.low.cmple(b.high).all()).collect();
+        let bounds = bounds(texels);
+        let after = bounds.into_iter().zip(&changed).filter(|(_, changed)| **changed);
+        let after = after.map(|(bounds, _)| ChangedBox { bounds, former_exitance: None });
+        let before = gone
+            .iter()
+            .map(|object| ChangedBox { bounds: object.bounds, former_exitance: Some(object.exitance) });
+        let boxes: Vec<ChangedBox> = after.chain(before).filter(|b| !b.bounds.is_empty()).collect();
         let names = names(objects, &changed, &gone, lights_or_sky_changed);
-        let (known, former_light) = known(scene, layout, texels, &unchanged);
+        let (known, former_light) = known(texels, &unchanged);
         let nothing_changed = former.content == hashes.content;
         let lights_changed = emitters_changed || lights_or_sky_changed;
         let unless_shadowed = |(known, is_shadowed): (&Option<&TexelSamples>, bool)| {
             known.filter(|_| !is_shadowed).map(|known| known.direct)
         };
+        let shadow_volumes = ShadowVolumes::new(sources, &boxes);
         let known_direct = match lights_changed {
-            true => vec![None; texels.len()],
-            false => {
-                let shadowed = shadowed(sources, texels, charts, &boxes);
-                known.iter().zip(shadowed).map(unless_shadowed).collect()
-            }
+            true => vec![None; texels.list.len()],
+            false => known.iter().zip(shadowed(texels, &shadow_volumes)).map(unless_shadowed).collect(),
         };
         Self {
             former,
             nothing_changed,
             changed,
             boxes,
+            shadow_volumes,
             lights_changed,
             names,
             known,
@@ -208,10 +165,19 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// Number of covered texels whose direct light is computed anew.
-    pub fn relit(&self, texels: &[Texel]) -> usize {
-        let pairs = texels.iter().zip(&self.known_direct);
-        pairs.filter(|(texel, known)| known.is_none() && !texel.is_hidden()).count()
+    /// What is kept of the former bake, of whose light by bounces that is `kept`. `mean` is the mean irradiance, mean of
+    /// the channels, W/m².
+    pub fn report(&self, texels: &CoveredTexels<'_>, kept: Option<&ReusedGather>, mean: f64) -> RebakeReport {
+        let open = texels.open().count();
+        let error = kept.map_or(0.0, |kept| kept.error(open));
+        RebakeReport {
+            whole: String::new(),
+            changed: self.names.clone(),
+            texels: open,
+            relit: texels.open().filter(|(texel, _)| self.known_direct[texel.place()].is_none()).count(),
+            gathered: kept.map_or(0, |kept| open - kept.count()),
+            neglected: if mean > 0.0 { error / mean } else { 0.0 },
+        }
     }
 }
 
@@ -236,12 +202,10 @@ fn names(objects: &[SceneObject], changed: &[bool], gone: &[&ObjectSamples], lig
 /// The former samples of every covered texel that still shows the same surface, and the former irradiance per texel of
 /// all maps. `unchanged` holds the former samples of each object that has not changed.
 fn known<'a>(
-    scene: &BakeScene,
-    layout: &LightmapLayout,
-    texels: &[Texel],
+    texels: &CoveredTexels<'_>,
     unchanged: &[Option<&'a ObjectSamples>],
 ) -> (Vec<Option<&'a TexelSamples>>, Vec<Vec3>) {
-    let first = first_triangles(scene, layout);
+    let (layout, first) = (texels.layout, first_triangles(texels));
     let mut light = vec![Vec3::NAN; layout.texels];
     for (map, object) in layout.maps.iter().zip(unchanged) {
         for texel in object.iter().flat_map(|object| &object.texels) {
@@ -251,6 +215,7 @@ fn known<'a>(
         }
     }
     let known = texels
+        .list
         .iter()
         .map(|texel| {
             let object = texel.object as usize;

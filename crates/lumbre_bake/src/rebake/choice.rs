@@ -3,10 +3,9 @@
 
 use super::changes::Changes;
 use super::samples::TexelSamples;
-use crate::coverage::footprint::Texel;
-use crate::direct_light::local_light::LocalLight;
-use crate::final_gather::gather_sums::GatherSums;
-use crate::final_gather::reused_gather::ReusedGather;
+use crate::coverage::Texel;
+use crate::direct_light::LocalLight;
+use crate::final_gather::{GatherSums, ReusedGather};
 use crate::texel_index::CoveredTexel;
 
 /// Largest error by reuse as a share of the requested error: the RMSE of all texels, and that of any one texel. The

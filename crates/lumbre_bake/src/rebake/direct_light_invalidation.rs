@@ -9,12 +9,12 @@ use lumbre_optics::LightKind;
 use rayon::prelude::*;
 
 use super::changed_box::ChangedBox;
-use crate::coverage::footprint::{Texel, receiver};
+use crate::bounds::Bounds;
 use crate::coverage::texel_geometry::positions_of;
-use crate::coverage::texel_groups::TexelGroups;
+use crate::coverage::{CoveredTexels, TexelGroups, receiver};
 use crate::scene::{Canonical, PlacedLight};
+use crate::sources::Sources;
 use crate::sources::emitters::lamps;
-use crate::sources::light_sources::Sources;
 
 /// Canonical units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,9 +26,7 @@ struct Sphere {
 impl Sphere {
     /// A sphere that contains all points.
     fn around(points: impl Iterator<Item = Vec3> + Clone) -> Self {
-        let (low, high) = points.clone().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| {
-            (low.min(point), high.max(point))
-        });
+        let Bounds { low, high } = points.clone().collect();
         let center = 0.5 * (low + high);
         Self { center, radius: points.map(|point| point.distance(center)).fold(0.0, f32::max) }
     }
@@ -47,7 +45,7 @@ enum Source {
 }
 
 /// Texels along the side of a block that is tested as a whole.
-const BLOCK: u32 = 8;
+const BLOCK_SIDE: u32 = 8;
 /// Longer than any path through a scene whose coordinates are below 2.25.
 const FAR: f32 = 16.0;
 /// Places in a texel of a smooth surface at which its height above the facets is taken into account.
@@ -81,21 +79,15 @@ impl ShadowVolumes {
 }
 
 /// Per covered texel, whether a box may block light that reaches it, or may have blocked it.
-pub(crate) fn shadowed(
-    sources: &Sources<'_>,
-    texels: &[Texel],
-    charts: &[u32],
-    boxes: &[ChangedBox],
-) -> Vec<bool> {
-    let scene = sources.scene;
-    let volumes = ShadowVolumes::new(sources, boxes);
-    let blocks = TexelGroups::blocks(texels, charts, BLOCK);
+pub(crate) fn shadowed(texels: &CoveredTexels<'_>, volumes: &ShadowVolumes) -> Vec<bool> {
+    let CoveredTexels { scene, list, charts, .. } = texels;
+    let blocks = TexelGroups::blocks(list, charts, BLOCK_SIDE);
     let is_shadowed: Vec<bool> = blocks
         .members
         .par_iter()
         .map(|members| {
             let mut points = Vec::new();
-            for texel in members.iter().map(|member| &texels[member.place()]) {
+            for texel in members.iter().map(|member| &list[member.place()]) {
                 positions_of(scene, texel, &mut points);
                 if !scene.triangles[texel.triangle as usize].flat {
                     // Light is computed at points of the smooth surface, which lies above the facets, most of all in

@@ -3,29 +3,26 @@
 
 use glam::Vec3;
 
-use crate::coverage::footprint::{Footprint, Texel};
+use crate::bounds::Bounds;
+use crate::coverage::{CoveredTexels, Footprint, Texel};
 use crate::sampling::hash;
-use crate::scene::{BakeScene, LightmapLayout};
-use crate::sources::light_sources::Sources;
+use crate::sources::Sources;
 
 /// The bounding box of each object, canonical units; empty for an object without triangles.
-pub(crate) fn bounds(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(Vec3, Vec3)> {
-    let mut bounds = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); layout.maps.len()];
-    for triangle in &scene.triangles {
-        let (low, high) = &mut bounds[triangle.object as usize];
-        for corner in triangle.corners {
-            (*low, *high) = (low.min(corner), high.max(corner));
-        }
+pub(crate) fn bounds(texels: &CoveredTexels<'_>) -> Vec<Bounds<Vec3>> {
+    let mut bounds = vec![Bounds::default(); texels.layout.maps.len()];
+    for triangle in &texels.scene.triangles {
+        bounds[triangle.object as usize].extend(triangle.corners);
     }
     bounds
 }
 
 /// Per object, a hash of its emitters; 0 if it has none.
-pub(crate) fn emission(scene: &BakeScene, sources: &Sources<'_>, layout: &LightmapLayout) -> Vec<u32> {
-    let first = first_triangles(scene, layout);
-    let mut emission = vec![0; layout.maps.len()];
+pub(crate) fn emission(sources: &Sources<'_>, texels: &CoveredTexels<'_>) -> Vec<u32> {
+    let first = first_triangles(texels);
+    let mut emission = vec![0; texels.layout.maps.len()];
     for emitter in &sources.emitters {
-        let object = scene.triangles[emitter.triangle as usize].object as usize;
+        let object = texels.scene.triangles[emitter.triangle as usize].object as usize;
         let radiance = emitter.radiance.to_array().map(f32::to_bits);
         let words = radiance.into_iter().chain([emitter.triangle - first[object], emitter.side as u32]);
         emission[object] = words.fold(emission[object], fold).max(1);
@@ -34,9 +31,10 @@ pub(crate) fn emission(scene: &BakeScene, sources: &Sources<'_>, layout: &Lightm
 }
 
 /// Per object, a hash of its lightmap's size and texture coordinates, by which its texels are placed on it.
-pub(crate) fn layouts(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
-    let mut sums: Vec<u32> = layout.maps.iter().map(|map| fold(fold(0, map.width), map.height)).collect();
-    for triangle in &scene.triangles {
+pub(crate) fn layouts(texels: &CoveredTexels<'_>) -> Vec<u32> {
+    let maps = texels.layout.maps.iter();
+    let mut sums: Vec<u32> = maps.map(|map| fold(fold(0, map.width), map.height)).collect();
+    for triangle in &texels.scene.triangles {
         let sum = &mut sums[triangle.object as usize];
         for uv in triangle.uv {
             *sum = fold(fold(*sum, uv.x.to_bits()), uv.y.to_bits());
@@ -66,9 +64,9 @@ pub(crate) fn fingerprint(texel: &Texel, first: u32) -> u32 {
 }
 
 /// The first triangle of each object.
-pub(crate) fn first_triangles(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
-    let mut first = vec![u32::MAX; layout.maps.len()];
-    for (index, triangle) in scene.triangles.iter().enumerate() {
+pub(crate) fn first_triangles(texels: &CoveredTexels<'_>) -> Vec<u32> {
+    let mut first = vec![u32::MAX; texels.layout.maps.len()];
+    for (index, triangle) in texels.scene.triangles.iter().enumerate() {
         let first = &mut first[triangle.object as usize];
         *first = (*first).min(index as u32);
     }

@@ -14,46 +14,33 @@ use rayon::prelude::*;
 use super::changed_box::ChangedBox;
 use super::changes::Changes;
 use super::choice;
-use super::direct_light_invalidation::ShadowVolumes;
 use super::estimate::{Estimate, Range, cone_to_sphere, direction_in_cone};
+use crate::bounds::Bounds;
 use crate::chunks::in_chunks;
-use crate::coverage::covered_texels::CoveredTexels;
-use crate::coverage::footprint::{Texel, receiver};
-use crate::coverage::texel_groups::TexelGroups;
-use crate::direct_light::DirectLight;
-use crate::direct_light::local_light::LocalLight;
-use crate::final_gather::reused_gather::ReusedGather;
+use crate::coverage::{CoveredTexels, Texel, TexelGroups, receiver};
+use crate::direct_light::{DirectLight, LocalLight};
+use crate::final_gather::ReusedGather;
 use crate::monitor::BakeMonitor;
-use crate::radiosity::exchange::Exchange;
-use crate::radiosity::form_factors::FormFactors;
-use crate::radiosity::patches::{Patch, Patches};
 use crate::radiosity::solution::gather;
+use crate::radiosity::{Exchange, FormFactors, Patch, Patches};
+use crate::report::StageNotes;
 use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
-use crate::scene::Receiver;
-use crate::scene::material::Side;
-use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
-use crate::sources::direct::Direct;
-use crate::sources::light_sources::Sources;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::scene::{BakeScene, Receiver, Side, SurfaceHit};
+use crate::sources::{Direct, Sources};
+use crate::texel_index::MapTexel;
+use crate::{BakeError, BakeOptions};
 
 /// Rays from a patch or from a block of texels. Every other one is aimed at what has changed.
 const RAYS: u32 = 32;
 /// Texels along the side of a block.
-const BLOCK: u32 = 4;
+const BLOCK_SIDE: u32 = 4;
 /// Nothing is kept of texels that are nearer to a changed box than this share of its size.
 const NEAR_BOX: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
-/// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The report counts about how many rays
-/// it took to decide.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the light of three stages, and the frame that every stage takes"
-)]
+/// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The
+/// notes count about how many rays it took to decide.
 pub(crate) fn reused_gather(
     changes: &Changes<'_>,
     sources: &Sources<'_>,
@@ -62,8 +49,7 @@ pub(crate) fn reused_gather(
     (exchange, factors): (&Exchange, &FormFactors),
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<ReusedGather, BakeError> {
+) -> Result<(ReusedGather, StageNotes), BakeError> {
     let change =
         monitor.run_interruptible(1.0, || IndirectChange::new(sources, changes, texels, &direct.texels))?;
     let unknown = if changes.nothing_changed { Vec::new() } else { change.unknown_backs(&exchange.patches) };
@@ -75,15 +61,14 @@ pub(crate) fn reused_gather(
     };
     let of_patches = change.of_patches(light, factors, options, monitor)?;
     let light = PatchLight { change: &of_patches, ..light };
-    let reused = change.keep(light, &texels.list, &direct.local, options, monitor)?;
-    report.rays += change.rays(&of_patches);
-    Ok(reused)
+    let reused = change.keep(light, &direct.local, options, monitor)?;
+    Ok((reused, StageNotes::of_rays(change.rays(&of_patches))))
 }
 
 /// The light before and after, as far as the estimate needs it.
 struct IndirectChange<'a> {
     scene: &'a BakeScene,
-    layout: &'a LightmapLayout,
+    texels: &'a CoveredTexels<'a>,
     changes: &'a Changes<'a>,
     blocks: TexelGroups,
     /// Per texel of all maps, the change of direct light (mixed lights included), W/m².
@@ -92,7 +77,6 @@ struct IndirectChange<'a> {
     sky: Vec3,
     /// Bounding spheres of the changed boxes: centre and radius.
     spheres: Vec<(Vec3, f32)>,
-    shadow_volumes: ShadowVolumes,
 }
 
 /// The light that leaves the patches in the new scene, and the change of their irradiance by bounces.
@@ -112,25 +96,23 @@ impl<'a> IndirectChange<'a> {
     fn new(
         sources: &Sources<'a>,
         changes: &'a Changes<'a>,
-        texels: &CoveredTexels<'a>,
+        texels: &'a CoveredTexels<'a>,
         direct: &[Direct],
     ) -> Self {
-        let CoveredTexels { layout, list: texels, charts, .. } = texels;
-        let mut change = vec![Vec3::ZERO; layout.texels];
-        for ((texel, now), known) in texels.iter().zip(direct).zip(&changes.known) {
+        let mut change = vec![Vec3::ZERO; texels.layout.texels];
+        for ((texel, now), known) in texels.list.iter().zip(direct).zip(&changes.known) {
             if let Some(known) = known {
                 change[texel.index.place()] = now.total() - known.direct.total();
             }
         }
         Self {
             scene: sources.scene,
-            layout,
+            texels,
             changes,
-            blocks: TexelGroups::blocks(texels, charts, BLOCK),
+            blocks: TexelGroups::blocks(&texels.list, &texels.charts, BLOCK_SIDE),
             direct: change,
             sky: sources.sky,
             spheres: changes.boxes.iter().map(|b| (b.center(), b.radius())).collect(),
-            shadow_volumes: ShadowVolumes::new(sources, &changes.boxes),
         }
     }
 
@@ -156,21 +138,18 @@ impl<'a> IndirectChange<'a> {
         let is_new = |patch: &Patch| {
             self.changes.changed[self.scene.triangles[patch.triangle as usize].object as usize]
         };
-        let immediate: Vec<(Vec3, Vec3)> = in_chunks(patches.list.len(), monitor, |index| {
+        let immediate: Vec<Range> = in_chunks(patches.list.len(), monitor, |index| {
             let patch = &patches.list[index];
             if is_new(patch) || patch.reflectance == Vec3::ZERO {
-                return (Vec3::ZERO, Vec3::ZERO);
+                return [Vec3::ZERO; 2];
             }
             let sequence = Sequence::new(options.seed, Stream::ChangedPatches, index as u32);
             let point = |x: f32, y: f32| {
                 let at = patches.point(patch, triangle_point(x, y));
                 Some(Receiver::on_facet(self.scene, patch.triangle, patch.side, at))
             };
-            self.sampled_change(sequence, &|_, x, y| point(x, y), light).means().into()
+            self.sampled_change(sequence, &|_, x, y| point(x, y), light).means()
         })?;
-        let bound = |which: usize, patch: usize| {
-            if which == 0 { immediate[patch].0 } else { immediate[patch].1 }
-        };
         // One job per bound and channel.
         let solve = |job: usize| {
             let (which, channel) = (job / 3, job % 3);
@@ -185,7 +164,7 @@ impl<'a> IndirectChange<'a> {
                 let emission: Vec<f64> = reflectance
                     .iter()
                     .enumerate()
-                    .map(|(patch, rho)| rho * (sign * f64::from(bound(which, patch)[channel])).max(0.0))
+                    .map(|(patch, rho)| rho * (sign * f64::from(immediate[patch][which][channel])).max(0.0))
                     .collect();
                 gather(factors, &solver.solve(factors, &reflectance, &emission, TOLERANCE).radiosity)
             });
@@ -195,7 +174,7 @@ impl<'a> IndirectChange<'a> {
             monitor.run_interruptible(1.0, || (0..6usize).into_par_iter().map(solve).collect())?;
         let change = |which: usize, patch: usize| {
             let [red, green, blue] = [0, 1, 2].map(|channel| solved[3 * which + channel][patch]);
-            bound(which, patch) + DVec3::new(red, green, blue).as_vec3()
+            immediate[patch][which] + DVec3::new(red, green, blue).as_vec3()
         };
         Ok((0..patches.list.len()).map(|patch| [change(0, patch), change(1, patch)]).collect())
     }
@@ -207,7 +186,7 @@ impl<'a> IndirectChange<'a> {
             patch.side == Side::Back
                 && patch.reflectance != Vec3::ZERO
                 && (self.changes.lights_changed
-                    || self.shadow_volumes.cross(&patches.corners(self.scene, patch)))
+                    || self.changes.shadow_volumes.cross(&patches.corners(self.scene, patch)))
         };
         patches.list.par_iter().map(is_unknown).collect()
     }
@@ -216,7 +195,6 @@ impl<'a> IndirectChange<'a> {
     fn keep(
         &self,
         light: PatchLight<'_>,
-        texels: &[Texel],
         local: &LocalLight,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
@@ -224,22 +202,22 @@ impl<'a> IndirectChange<'a> {
         if self.changes.nothing_changed {
             return Ok(choice::keep_all(self.changes));
         }
-        let change = self.of_texels(texels, light, options, monitor)?;
-        Ok(choice::choose(self.changes, texels, &change, local, options.error))
+        let change = self.of_texels(light, options, monitor)?;
+        Ok(choice::choose(self.changes, &self.texels.list, &change, local, options.error))
     }
 
     /// By how much the light by bounces may have changed at every covered texel, W/m², root mean square of the
     /// channels. It is estimated for blocks of texels, and infinite in and next to changed boxes.
     fn of_texels(
         &self,
-        texels: &[Texel],
         light: PatchLight<'_>,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<f32>, BakeError> {
         let of_blocks = in_chunks(self.blocks.members.len(), monitor, |block| {
+            let members = &self.blocks.members[block];
             let members: Vec<&Texel> =
-                self.blocks.members[block].iter().map(|member| &texels[member.place()]).collect();
+                members.iter().map(|member| &self.texels.list[member.place()]).collect();
             if members.is_empty() {
                 return 0.0f32;
             }
@@ -263,7 +241,7 @@ impl<'a> IndirectChange<'a> {
         self.changes
             .boxes
             .iter()
-            .any(|b| position.clamp(b.low, b.high).distance(position) <= NEAR_BOX * b.radius())
+            .any(|b| position.clamp(b.bounds.low, b.bounds.high).distance(position) <= NEAR_BOX * b.radius())
     }
 
     /// Samples the change of a receiver's irradiance by bounces: half the rays are cosine-distributed, half are aimed
@@ -371,11 +349,11 @@ impl<'a> IndirectChange<'a> {
         distance: f32,
     ) -> impl Iterator<Item = Range> {
         let crosses = move |b: &ChangedBox| {
+            let Bounds { low, high } = b.bounds;
             let (mut from, mut to) = (0.0f32, distance);
             for axis in 0..3 {
                 let inverse = 1.0 / direction[axis];
-                let (a, b) =
-                    ((b.low[axis] - origin[axis]) * inverse, (b.high[axis] - origin[axis]) * inverse);
+                let (a, b) = ((low[axis] - origin[axis]) * inverse, (high[axis] - origin[axis]) * inverse);
                 // Both are NaN for a ray in the plane of a flat box, and `min` and `max` ignore them. (Only one is NaN
                 // for a ray in the plane of a side of another box: the ray then counts as outside.)
                 from = from.max(a.min(b));
@@ -391,10 +369,10 @@ impl<'a> IndirectChange<'a> {
         &self,
         triangle: u32,
         side: Side,
-        (u, v): (f32, f32),
+        at: (f32, f32),
         light: PatchLight<'_>,
     ) -> Option<(Vec3, Range)> {
-        let Some(patch) = light.patches.at(triangle, side, (u, v)) else {
+        let Some(patch) = light.patches.at(triangle, side, at) else {
             return Some((Vec3::ZERO, [Vec3::ZERO; 2]));
         };
         let patch = patch.place();
@@ -405,15 +383,10 @@ impl<'a> IndirectChange<'a> {
         let bounced = light.change.get(patch).map_or([Vec3::ZERO; 2], |range| range.map(|c| reflectance * c));
         // Where no texel shows the surface, its former light is taken to be the patch's present light.
         let exitance = light.exitance[patch];
-        let scene_triangle = &self.scene.triangles[triangle as usize];
-        let map = &self.layout.maps[scene_triangle.object as usize];
-        let [a, b, c] = scene_triangle.uv;
-        let uv = a + (b - a) * u + (c - a) * v;
-        let (x, y) = (uv.x as u32, uv.y as u32);
-        if side == Side::Back || x >= map.width || y >= map.height {
+        let shown = self.texels.layout.texel_at(&self.scene.triangles[triangle as usize], at);
+        let Some(texel) = shown.filter(|_| side == Side::Front).map(MapTexel::place) else {
             return Some((exitance, bounced));
-        }
-        let texel = map.first + (y * map.width + x) as usize;
+        };
         let before = self.changes.former_light[texel];
         // A texel without former light was hidden: the object that hid it is gone, and the ray crosses its box.
         let before = if before.is_nan() { exitance } else { reflectance * before };

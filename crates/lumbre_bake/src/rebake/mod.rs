@@ -26,14 +26,11 @@ mod direct_light_invalidation;
 mod estimate;
 mod fingerprints;
 mod indirect_change;
-mod report;
 mod reuse;
 mod samples;
 mod samples_file;
-mod settled;
 
 pub(crate) use indirect_change::reused_gather;
-pub(crate) use report::rebake_report;
 pub(crate) use reuse::Reuse;
 pub use samples::Samples;
 pub(crate) use samples::TexelSamples;

@@ -1,19 +1,16 @@
 //! The samples of every texel of a bake, before they became a map, from which the next bake of a changed scene can keep
 //! some. The file format is in `samples_file`.
 
-use crate::color::channel_mean;
-use crate::rebake::fingerprints::{fingerprint, first_triangles};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::fingerprints::{bounds, emission, layouts};
-use super::settled;
-use crate::content_hash::{ContentHash, Hashes};
-use crate::coverage::footprint::Texel;
-use crate::final_gather::gather_sums::{GatherSums, UnguidedLight, Weights};
-use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject};
-use crate::sources::direct::Direct;
-use crate::sources::light_sources::Sources;
+use super::fingerprints::{fingerprint, first_triangles};
+use crate::bounds::Bounds;
+use crate::color::channel_mean;
+use crate::content_hash::ContentHash;
+use crate::final_gather::{GatherSums, LitTexels, UnguidedLight, Weights};
+use crate::scene::Canonical;
+use crate::sources::Direct;
 
 /// The samples of a finished bake, to be given to [`Bake::former`](crate::Bake::former) when the scene has changed.
 #[derive(Clone, Debug)]
@@ -43,8 +40,7 @@ pub(crate) struct ObjectSamples {
     pub hash: ContentHash,
     pub name: String,
     /// Bounding box, canonical units.
-    pub low: Vec3,
-    pub high: Vec3,
+    pub bounds: Bounds<Vec3>,
     /// Hash of its emitters; 0 if it has none.
     pub emission: u32,
     /// Light that leaves it, without its emission, W/m²: the least and the most of its patches, by channel.
@@ -63,7 +59,6 @@ pub(crate) struct TexelSamples {
     /// Hash of what it shows of its object.
     pub footprint: u32,
     pub direct: Direct,
-    #[serde(with = "settled")]
     pub gathered: GatherSums,
     /// Irradiance by bounces that the map showed, W/m².
     pub bounced: Vec3,
@@ -119,7 +114,7 @@ impl GatherSums {
         let count = self.samples as f32;
         let sums = self.estimates().map(|estimate| estimate * count);
         let weights = sums.map(|sum| Weights::of_equal(sum, self.samples));
-        Self { sums, weights, rays: 0, unguided: UnguidedLight::NONE, ..*self }
+        Self { sums, weights, rays: 0, unguided: UnguidedLight::default(), ..*self }
     }
 }
 
@@ -132,65 +127,21 @@ impl Weights {
     }
 }
 
-/// Collects the results of a bake, by covered texel, as samples by object. `reuse_error` is empty if nothing was kept.
-pub(crate) struct SampleCollector<'a> {
-    pub scene: &'a BakeScene,
-    pub layout: &'a LightmapLayout,
-    pub texels: &'a [Texel],
-    pub direct: &'a [Direct],
-    pub gathered: &'a [GatherSums],
-    pub bounced: &'a [Vec3],
-    pub reuse_error: &'a [f32],
-}
-
-impl SampleCollector<'_> {
-    /// The samples of the whole bake. `exitance` holds the least and the most of each object, or is empty.
-    pub fn samples(
-        &self,
-        identity: ContentHash,
-        hashes: &Hashes,
-        objects: &[SceneObject],
-        sources: &Sources<'_>,
-        exitance: &[[Vec3; 2]],
-    ) -> Samples {
-        let bounds = bounds(self.scene, self.layout);
-        let emission = emission(self.scene, sources, self.layout);
-        let layouts = layouts(self.scene, self.layout);
-        let of_object = |(index, texels): (usize, Vec<TexelSamples>)| ObjectSamples {
-            hash: hashes.objects[index],
-            name: objects[index].name.clone(),
-            low: bounds[index].0,
-            high: bounds[index].1,
-            emission: emission[index],
-            exitance: exitance.get(index).copied().unwrap_or_default(),
-            layout: layouts[index],
-            texels,
-        };
-        Samples(Content {
-            content: hashes.content,
-            identity,
-            sampling: hashes.sampling,
-            lights: hashes.lights,
-            sky: sources.sky,
-            space: self.scene.space,
-            density: self.layout.density,
-            objects: self.by_object().into_iter().enumerate().map(of_object).collect(),
-        })
-    }
-
-    /// The samples of each object's texels.
-    fn by_object(&self) -> Vec<Vec<TexelSamples>> {
-        let first = first_triangles(self.scene, self.layout);
-        let mut by_object: Vec<Vec<TexelSamples>> = vec![Vec::new(); self.layout.maps.len()];
-        for (index, texel) in self.texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
-            let object = texel.object as usize;
-            let samples = TexelSamples {
-                cell: texel.y * self.layout.maps[object].width + texel.x,
+impl TexelSamples {
+    /// The samples of a bake, by object. `reuse_error` is per covered texel, and empty if nothing was kept.
+    pub fn by_object(lit: &LitTexels<'_>, reuse_error: &[f32]) -> Vec<Vec<Self>> {
+        let LitTexels { texels, direct, indirect, .. } = lit;
+        let first = first_triangles(texels);
+        let mut by_object: Vec<Vec<Self>> = vec![Vec::new(); texels.layout.maps.len()];
+        for (covered, texel) in texels.open() {
+            let (index, object) = (covered.place(), texel.object as usize);
+            let samples = Self {
+                cell: texel.y * texels.layout.maps[object].width + texel.x,
                 footprint: fingerprint(texel, first[object]),
-                direct: self.direct[index],
-                gathered: self.gathered.get(index).map_or_else(GatherSums::default, GatherSums::settled),
-                bounced: self.bounced.get(index).copied().unwrap_or_default(),
-                reuse_error: self.reuse_error.get(index).copied().unwrap_or_default(),
+                direct: direct.texels[index],
+                gathered: indirect.gathered.get(index).map_or_else(GatherSums::default, GatherSums::settled),
+                bounced: indirect.light.get(index).copied().unwrap_or_default(),
+                reuse_error: reuse_error.get(index).copied().unwrap_or_default(),
             };
             // Values that overflowed are not worth keeping.
             if samples.is_sound() {

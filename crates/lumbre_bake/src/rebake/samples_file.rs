@@ -5,8 +5,8 @@
 //!   version    u32       VERSION; everything is little endian
 //!   checksum  32 bytes   BLAKE3 of all that follows
 //!   length     u64       of the uncompressed rest, in bytes
-//!   content              a Zstandard frame, two thirds of that length, as most digits are noise: `Content`, field by
-//!                        field, in the format of postcard; a texel takes some 150 bytes
+//!   content              a Zstandard frame, about half of that length, as most digits are noise: `Content`, field by
+//!                        field, in the format of postcard; a texel takes some 230 bytes
 //! ```
 //!
 //! Reading never allocates more than the file's bytes can hold or the length states; a file that is cut short or
@@ -22,7 +22,7 @@ use crate::scene::Canonical;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
 /// The version of the format. Files of other versions are not read.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const CHECKSUM: usize = 32;
 /// Compression level of Zstandard: higher ones take longer and save no more.
 const LEVEL: i32 = 1;

@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
 
 /// Most triangles in a leaf.
@@ -10,8 +11,7 @@ const MAX_LEAF_TRIANGLES: usize = 4;
 
 #[derive(Debug)]
 struct Node {
-    low: Vec3,
-    high: Vec3,
+    bounds: Bounds<Vec3>,
     /// Of a leaf, the index of its first item; of an inner node, the index of its second child (the first child
     /// directly follows the node).
     first: u32,
@@ -40,24 +40,24 @@ impl BoxTree {
         Self { nodes, items }
     }
 
-    /// Calls `visit` for every triangle that may overlap the box from `low` to `high` (all triangles of each leaf that
+    /// Calls `visit` for every triangle that may overlap a box (all triangles of each leaf that
     /// overlaps it). The order depends on the scene alone.
-    pub fn near(&self, low: Vec3, high: Vec3, mut visit: impl FnMut(u32)) {
-        self.near_while(low, high, |index| {
+    pub fn near(&self, place: &Bounds<Vec3>, mut visit: impl FnMut(u32)) {
+        self.near_while(place, |index| {
             visit(index);
             true
         });
     }
 
     /// Like [`near`](Self::near), but stops as soon as `visit` returns `false`. Returns whether it visited all of them.
-    pub fn near_while(&self, low: Vec3, high: Vec3, mut visit: impl FnMut(u32) -> bool) -> bool {
+    pub fn near_while(&self, place: &Bounds<Vec3>, mut visit: impl FnMut(u32) -> bool) -> bool {
         if self.nodes.is_empty() {
             return true;
         }
         let mut stack = vec![0u32];
         while let Some(index) = stack.pop() {
             let node = &self.nodes[index as usize];
-            if node.low.cmpgt(high).any() || node.high.cmplt(low).any() {
+            if node.bounds.low.cmpgt(place.high).any() || node.bounds.high.cmplt(place.low).any() {
                 continue;
             }
             if node.count == 0 {
@@ -81,17 +81,15 @@ fn build(
     end: usize,
     nodes: &mut Vec<Node>,
 ) {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for corner in items[first..end].iter().flat_map(|&index| triangles[index as usize]) {
-        (low, high) = (low.min(corner), high.max(corner));
-    }
+    let bounds: Bounds<Vec3> =
+        items[first..end].iter().flat_map(|&index| triangles[index as usize]).collect();
     let (index, count) = (nodes.len(), end - first);
     let is_leaf = count <= MAX_LEAF_TRIANGLES || stop.is_cancelled();
-    nodes.push(Node { low, high, first: first as u32, count: if is_leaf { count as u32 } else { 0 } });
+    nodes.push(Node { bounds, first: first as u32, count: if is_leaf { count as u32 } else { 0 } });
     if is_leaf {
         return;
     }
-    let axis = (high - low).max_position();
+    let axis = (bounds.high - bounds.low).max_position();
     // Three times the centroid's coordinate, which sorts as the centroid does.
     let position = |&index: &u32| triangles[index as usize].iter().map(|corner| corner[axis]).sum::<f32>();
     items[first..end].sort_by(|a, b| position(a).total_cmp(&position(b)).then(a.cmp(b)));

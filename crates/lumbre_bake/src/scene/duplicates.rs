@@ -6,13 +6,15 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
+use super::position_bits;
+
 /// For each triangle, whether a coincident one replaces it. `emits` says which triangles emit light.
 pub(crate) fn is_hidden_duplicate(triangles: &[[Vec3; 3]], emits: &[bool]) -> Vec<bool> {
     let mut first: HashMap<[[u32; 3]; 3], usize> = HashMap::with_capacity(triangles.len());
     let mut is_hidden_duplicate = vec![false; triangles.len()];
     for (index, triangle) in triangles.iter().enumerate() {
-        let keys = triangle.map(|position| (position + Vec3::ZERO).to_array().map(f32::to_bits));
-        // Rotating the corners so that the smallest comes first keeps the winding. (Adding zero makes -0 and 0 equal.)
+        let keys = triangle.map(position_bits);
+        // Rotating the corners so that the smallest comes first keeps the winding.
         let smallest = (0..3).min_by_key(|&i| keys[i]).unwrap_or(0);
         let key = [keys[smallest], keys[(smallest + 1) % 3], keys[(smallest + 2) % 3]];
         match first.get(&key).copied() {

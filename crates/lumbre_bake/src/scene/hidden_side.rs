@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
+use super::position_bits;
 use crate::disjoint_sets::DisjointSets;
 
 /// For each triangle, the number of its connected piece if that piece is closed, that is, if every directed edge is
@@ -15,10 +16,8 @@ pub(crate) fn closed_pieces(triangles: &[[Vec3; 3]]) -> Vec<Option<u32>> {
         .iter()
         .map(|triangle| {
             triangle.map(|position| {
-                // Adding zero turns -0 into 0, which is the same position.
-                let key = (position + Vec3::ZERO).to_array().map(f32::to_bits);
                 let next = vertices.len() as u32;
-                *vertices.entry(key).or_insert(next)
+                *vertices.entry(position_bits(position)).or_insert(next)
             })
         })
         .collect();

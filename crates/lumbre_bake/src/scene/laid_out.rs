@@ -1,6 +1,6 @@
 //! Builds a `BakeScene` and its layout from objects in one step, for the tests of later stages.
 
-use super::{BakeScene, Canonical, LightmapLayout, SceneObject, density_of, lay_out};
+use super::{BakeScene, Canonical, Layouter, LightmapLayout, SceneObject, density_of};
 use crate::BakeOptions;
 use crate::cancel_token::CancelToken;
 
@@ -10,9 +10,9 @@ pub(crate) fn laid_out(
     space: Canonical,
     options: &BakeOptions,
 ) -> (LightmapLayout, BakeScene) {
-    let (density, stop, mut warnings) =
-        (density_of(objects, space, options), CancelToken::default(), Vec::new());
-    let layout = lay_out(objects, space, density, options, &stop, &mut warnings).unwrap();
-    let scene = BakeScene::new(objects, &layout, space, &stop, &mut warnings).unwrap();
+    let (density, stop) = (density_of(objects, space, options), CancelToken::default());
+    let mut layouter = Layouter { space, density, options, stop: &stop, warnings: Vec::new() };
+    let layout = layouter.lay_out(objects).unwrap();
+    let scene = BakeScene::new(objects, &layout, space, &stop, &mut layouter.warnings).unwrap();
     (layout, scene)
 }

@@ -22,8 +22,9 @@ pub(crate) struct SurfaceMaterial {
 }
 
 /// A side of a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Side {
+    #[default]
     Front,
     Back,
 }

@@ -3,8 +3,8 @@
 
 use glam::Vec3;
 
-/// Corners of a piece, each by the barycentric weights of the triangle's second and third vertex.
-pub(crate) type Corners = [(f32, f32); 3];
+/// SubTriangle of a piece, each by the barycentric weights of the triangle's second and third vertex.
+pub(crate) type SubTriangle = [(f32, f32); 3];
 
 /// Mean of `value` at the centroids of n² equal pieces of a triangle, given by the barycentric weights of its second
 /// and third vertex.
@@ -18,7 +18,7 @@ pub(crate) fn mean_of_points(n: u32, mut value: impl FnMut((f32, f32)) -> Vec3) 
 }
 
 /// Calls `visit` with the corners of each of n² equal pieces of a triangle.
-pub(crate) fn pieces(n: u32, mut visit: impl FnMut(Corners)) {
+pub(crate) fn pieces(n: u32, mut visit: impl FnMut(SubTriangle)) {
     let at = |a: u32, b: u32| (a as f32 / n as f32, b as f32 / n as f32);
     for a in 0..n {
         for b in 0..n - a {

@@ -8,6 +8,7 @@ mod from_world;
 mod hidden_side;
 #[cfg(test)]
 pub(crate) mod laid_out;
+mod layouter;
 mod leaks;
 mod lightmap_layout;
 pub(crate) mod material;
@@ -20,11 +21,15 @@ mod texture;
 mod texture_coordinates;
 mod triangles;
 
+pub(crate) use crossings::Face;
+pub(crate) use material::{ShownTexels, Side, SurfaceMaterial};
+
 pub(crate) use from_world::{Entities, from_world};
-pub(crate) use lightmap_layout::{LightmapLayout, MapLayout, density_of, lay_out, world_points};
-pub(crate) use material::SurfaceMaterial;
+pub(crate) use layouter::{Layouter, density_of};
+pub(crate) use lightmap_layout::{LightmapLayout, MapLayout};
 pub(crate) use occlusion::SurfaceHit;
 pub(crate) use receiver::Receiver;
+pub(crate) use static_scene::world_points;
 pub use static_scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
 pub(crate) use texture_coordinates::textures_of;
-pub(crate) use triangles::{BakeScene, Canonical, SceneTriangle};
+pub(crate) use triangles::{BakeScene, Canonical, SceneTriangle, position_bits};

@@ -6,7 +6,7 @@ use super::BakeScene;
 use super::material::Side;
 
 /// A point on a surface that receives light.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Receiver {
     /// On the surface.
     pub position: Vec3,

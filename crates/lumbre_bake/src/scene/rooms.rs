@@ -2,11 +2,12 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::bounds::Bounds;
+
 /// A closed piece of a mesh whose fronts face inward.
 #[derive(Clone, Debug)]
 pub(crate) struct Room {
-    low: Vec3,
-    high: Vec3,
+    bounds: Bounds<Vec3>,
     /// The planes of a convex room: inward unit normals with their distance from the coordinate origin. Empty if the
     /// room is not convex or has more than [`MAX_SIDES`] triangles.
     sides: Vec<(DVec3, f64)>,
@@ -18,8 +19,8 @@ const TOUCHING: f32 = 64.0 / (1 << 24) as f32;
 const MAX_SIDES: usize = 256;
 
 impl Room {
-    fn new(triangles: &[[Vec3; 3]], low: Vec3, high: Vec3) -> Self {
-        let mut room = Self { low, high, sides: Vec::new() };
+    fn new(triangles: &[[Vec3; 3]], bounds: Bounds<Vec3>) -> Self {
+        let mut room = Self { bounds, sides: Vec::new() };
         if triangles.len() <= MAX_SIDES {
             let side = |corners: &[Vec3; 3]| {
                 let [a, b, c] = corners.map(|corner| corner.as_dvec3());
@@ -36,7 +37,7 @@ impl Room {
 
     /// Distance that counts as touching, in canonical units.
     fn slack(&self) -> f32 {
-        TOUCHING * self.low.abs().max(self.high.abs()).max_element()
+        TOUCHING * self.bounds.low.abs().max(self.bounds.high.abs()).max_element()
     }
 
     /// Whether a point is inside the room or on its sides; `false` also where this is unknown, because no planes are
@@ -49,28 +50,28 @@ impl Room {
 
     /// Whether all three corners lie in the room's bounding box.
     fn spans(&self, corners: &[Vec3; 3]) -> bool {
-        corners.iter().all(|corner| corner.cmpge(self.low).all() && corner.cmple(self.high).all())
+        let Bounds { low, high } = self.bounds;
+        corners.iter().all(|corner| corner.cmpge(low).all() && corner.cmple(high).all())
     }
 
     /// Whether the room's bounding box lies within another box, or touches it from inside.
-    pub fn is_within(&self, low: Vec3, high: Vec3) -> bool {
+    pub fn is_within(&self, outer: Bounds<Vec3>) -> bool {
         let slack = self.slack();
-        (low - slack).cmple(self.low).all() && (high + slack).cmpge(self.high).all()
+        (outer.low - slack).cmple(self.bounds.low).all() && (outer.high + slack).cmpge(self.bounds.high).all()
     }
 }
 
 /// A closed piece of a mesh, with its number and bounding box.
-pub(crate) struct Piece {
+pub(crate) struct ClosedShell {
     pub number: u32,
-    pub low: Vec3,
-    pub high: Vec3,
+    pub bounds: Bounds<Vec3>,
     /// Present if its fronts face inward.
     pub room: Option<Room>,
 }
 
 /// The closed pieces in ascending order of their numbers. `pieces` gives for each triangle the number of its closed
 /// piece, if any.
-pub(crate) fn pieces(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<Piece> {
+pub(crate) fn closed_shells(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<ClosedShell> {
     let mut order: Vec<(u32, usize)> =
         pieces.iter().enumerate().filter_map(|(index, piece)| Some(((*piece)?, index))).collect();
     order.sort_unstable();
@@ -78,16 +79,14 @@ pub(crate) fn pieces(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<Pie
         let corners: Vec<[Vec3; 3]> = same.iter().map(|&(_, index)| triangles[index]).collect();
         let origin = corners[0][0].as_dvec3();
         // Six times the signed volume: negative where the fronts face inward.
-        let (mut low, mut high, mut volume) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0);
+        let mut volume = 0.0;
         for corners in &corners {
             let [a, b, c]: [DVec3; 3] = corners.map(|corner| corner.as_dvec3() - origin);
             volume += a.dot(b.cross(c));
-            for corner in corners {
-                (low, high) = (low.min(*corner), high.max(*corner));
-            }
         }
-        let room = (volume < 0.0).then(|| Room::new(&corners, low, high));
-        Piece { number: same[0].0, low, high, room }
+        let bounds = corners.iter().flatten().copied().collect();
+        let room = (volume < 0.0).then(|| Room::new(&corners, bounds));
+        ClosedShell { number: same[0].0, bounds, room }
     };
     order.chunk_by(|a, b| a.0 == b.0).map(piece).collect()
 }
@@ -114,7 +113,10 @@ mod tests {
     use super::*;
 
     fn rooms_of(triangles: &[[Vec3; 3]]) -> Vec<Room> {
-        pieces(triangles, &closed_pieces(triangles)).into_iter().filter_map(|piece| piece.room).collect()
+        closed_shells(triangles, &closed_pieces(triangles))
+            .into_iter()
+            .filter_map(|piece| piece.room)
+            .collect()
     }
 
     #[test]
@@ -124,7 +126,10 @@ mod tests {
         assert!(rooms_of(&block).is_empty());
         let both = [room.clone(), block].concat();
         let rooms = rooms_of(&both);
-        assert_eq!((rooms.len(), rooms[0].low, rooms[0].high), (1, Vec3::splat(-2.0), Vec3::splat(2.0)));
+        assert_eq!(
+            (rooms.len(), rooms[0].bounds),
+            (1, Bounds { low: Vec3::splat(-2.0), high: Vec3::splat(2.0) })
+        );
         assert!(all_within(&rooms, both.iter().copied()));
         assert!(!all_within(&rooms, std::iter::once([Vec3::ZERO, Vec3::X, Vec3::Y * 3.0])));
         assert!(!all_within(&rooms_of(&both[1..]), room.iter().copied()));
@@ -150,6 +155,7 @@ mod tests {
             .collect();
         let dented = &rooms_of(&dented)[0];
         assert!(!dented.contains(Vec3::ZERO));
-        assert!(room.is_within(room.low, room.high) && !room.is_within(room.low * 0.9, room.high));
+        let smaller = Bounds { low: room.bounds.low * 0.9, ..room.bounds };
+        assert!(room.is_within(room.bounds) && !room.is_within(smaller));
     }
 }

@@ -9,7 +9,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{Light, LightKind, Material};
 use lumbre_scene::MaterialTextures;
 
-use super::{Canonical, world_points};
+use super::Canonical;
 use crate::options::Probes;
 use crate::{BakeError, BakeOptions};
 
@@ -140,4 +140,12 @@ impl StaticScene {
     pub(crate) fn moving_points(&self) -> &[DVec3] {
         self.moving.as_deref().unwrap_or_default()
     }
+}
+
+/// The positions of a mesh's vertices in the world.
+pub(crate) fn world_points<'a>(
+    transform: &'a DAffine3,
+    mesh: &'a TriangleMesh,
+) -> impl Iterator<Item = DVec3> + 'a {
+    mesh.positions.iter().map(|p| transform.transform_point3(p.as_dvec3()))
 }

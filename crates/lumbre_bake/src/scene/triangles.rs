@@ -11,10 +11,11 @@ use super::duplicates::is_hidden_duplicate;
 use super::hidden_side::closed_pieces;
 use super::leaks::Leaks;
 use super::material::{LARGEST_REFLECTANCE, Side};
-use super::rooms::{Room, all_within, pieces};
+use super::rooms::{Room, all_within, closed_shells};
 use super::texture_coordinates::textures_of;
-use super::{LightmapLayout, PlacedPrimitive, SceneObject, SurfaceMaterial, world_points};
+use super::{LightmapLayout, MapLayout, PlacedPrimitive, SceneObject, SurfaceMaterial, world_points};
 use crate::BakeError;
+use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
 
 /// The canonical space that the baker computes in.
@@ -29,13 +30,11 @@ pub(crate) struct Canonical {
 impl Canonical {
     /// The canonical space of a scene with these points; points that are not finite are ignored.
     pub fn of(points: impl Iterator<Item = DVec3>) -> Self {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for point in points.filter(|point| point.is_finite()) {
-            (low, high) = (low.min(point), high.max(point));
-        }
-        if !low.cmple(high).all() {
+        let bounds: Bounds<DVec3> = points.filter(|point| point.is_finite()).collect();
+        if bounds.is_empty() {
             return Self { center: DVec3::ZERO, scale: 1.0 };
         }
+        let Bounds { low, high } = bounds;
         let center = 0.5 * low + 0.5 * high;
         let reach = (high - center).max_element();
         // Rounding in log2 can put the exponent off by one at worst, which is good enough.
@@ -57,6 +56,11 @@ impl Canonical {
     pub fn world(&self, position: Vec3) -> DVec3 {
         position.as_dvec3() / self.scale + self.center
     }
+}
+
+/// The bits of a position, equal for equal positions: adding zero turns -0 into 0.
+pub(crate) fn position_bits(position: Vec3) -> [u32; 3] {
+    (position + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
 /// A triangle of the scene.
@@ -166,15 +170,22 @@ impl BakeScene {
         if count > MAX_TRIANGLES {
             return Err(BakeError::TooManyTriangles { triangles: count, limit: MAX_TRIANGLES });
         }
-        let (mut triangles, mut surfaces) = (Vec::with_capacity(count), Vec::new());
-        let (mut rooms, mut solids) = (Vec::new(), Vec::new());
-        for (index, object) in objects.iter().enumerate() {
-            let first = triangles.len();
-            extract_object(object, index as u32, layout, space, &mut triangles, &mut surfaces, warnings);
-            mark_closed(&mut triangles, first, &mut rooms, &mut solids);
+        let mut extraction = Extraction {
+            space,
+            triangles: Vec::with_capacity(count),
+            surfaces: Vec::new(),
+            rooms: Vec::new(),
+            solids: Vec::new(),
+            warnings,
+        };
+        for ((index, object), map) in (0..).zip(objects).zip(&layout.maps) {
+            let first = extraction.triangles.len();
+            extraction.extract_object(object, index, map);
+            extraction.mark_closed(first);
         }
-        unmark_hollow_solids(&mut triangles, &rooms, &solids, warnings);
-        mark_hidden_duplicates(&mut triangles, &surfaces, warnings);
+        extraction.unmark_hollow_solids();
+        extraction.mark_hidden_duplicates();
+        let Extraction { triangles, surfaces, rooms, .. } = extraction;
         let corners: Vec<[Vec3; 3]> = triangles
             .iter()
             // Both trees leave out triangles with NaN corners, and keep the indices of the others.
@@ -203,104 +214,182 @@ impl BakeScene {
     }
 }
 
-/// Appends an object's triangles and materials.
-fn extract_object(
-    object: &SceneObject,
-    index: u32,
-    layout: &LightmapLayout,
+/// A scene while its triangles are extracted from objects.
+struct Extraction<'a> {
     space: Canonical,
-    triangles: &mut Vec<SceneTriangle>,
-    surfaces: &mut Vec<SurfaceMaterial>,
-    warnings: &mut Vec<String>,
-) {
-    let map = &layout.maps[index as usize];
-    let size = Vec2::new(map.width as f32, map.height as f32);
-    let mut left_out = LeftOut::default();
-    for ((primitive, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
-        let surface = surfaces.len() as u32;
-        // A texture lowers its factor, so the factor alone says nothing; `SurfaceMaterial` clamps the product at each
-        // point.
-        let textured = primitive
-            .textures
-            .as_ref()
-            .is_some_and(|textures| textures.base_color.is_some() || textures.metallic_roughness.is_some());
-        check_reflectance(&primitive.material.front.diffuse, textured, &object.name, warnings);
-        surfaces.push(SurfaceMaterial {
-            material: primitive.material.clone(),
-            textures: textures_of(primitive, moved),
-            mesh: mesh.clone(),
-        });
-        extract_triangles(primitive, mesh, space, size, (surface, index), triangles, &mut left_out);
-    }
-    let LeftOut { not_finite, without_area } = left_out;
-    if not_finite > 0 {
-        warnings.push(format!(
-            "{}: {not_finite} triangles with NaN or infinite positions were left out",
-            object.name
-        ));
-    }
-    if without_area > 0 {
-        warnings.push(format!("{}: {without_area} triangles without area were left out", object.name));
-    }
+    triangles: Vec<SceneTriangle>,
+    surfaces: Vec<SurfaceMaterial>,
+    rooms: Vec<Room>,
+    /// The closed pieces whose fronts face outward: their numbers, ascending, and bounding boxes.
+    solids: Vec<(u32, Bounds<Vec3>)>,
+    warnings: &'a mut Vec<String>,
 }
 
-/// Numbers of triangles that are left out of the scene.
-#[derive(Default)]
-struct LeftOut {
-    not_finite: usize,
-    without_area: usize,
-}
-
-/// Appends the triangles of a primitive, which has the indices `surface` and `object`, on a map of `size` texels.
-fn extract_triangles(
-    primitive: &PlacedPrimitive,
-    mesh: &TriangleMesh,
-    space: Canonical,
-    size: Vec2,
-    (surface, object): (u32, u32),
-    triangles: &mut Vec<SceneTriangle>,
-    left_out: &mut LeftOut,
-) {
-    let positions: Vec<Vec3> =
-        world_points(&primitive.transform, mesh).map(|point| space.position(point)).collect();
-    let linear = primitive.transform.matrix3;
-    let is_mirrored = linear.determinant() < 0.0;
-    let cofactor = normal_matrix(linear, is_mirrored);
-    for [a, b, c] in mesh.triangles() {
-        let vertices = if is_mirrored { [a, c, b] } else { [a, b, c] };
-        let corners = vertices.map(|vertex| positions[vertex as usize]);
-        if !corners.iter().all(|corner| corner.is_finite()) {
-            left_out.not_finite += 1;
-            continue;
+impl Extraction<'_> {
+    /// Appends an object's triangles and materials.
+    fn extract_object(&mut self, object: &SceneObject, index: u32, map: &MapLayout) {
+        let name = &object.name;
+        let (mut not_finite, mut without_area) = (0, 0);
+        for ((primitive, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
+            // A texture lowers its factor, so the factor alone says nothing; `SurfaceMaterial` clamps the product at
+            // each point.
+            let textured = primitive.textures.as_ref().is_some_and(|textures| {
+                textures.base_color.is_some() || textures.metallic_roughness.is_some()
+            });
+            self.check_reflectance(&primitive.material.front.diffuse, textured, name);
+            let surface = self.surfaces.len() as u32;
+            self.surfaces.push(SurfaceMaterial {
+                material: primitive.material.clone(),
+                textures: textures_of(primitive, moved),
+                mesh: mesh.clone(),
+            });
+            let size = Vec2::new(map.width as f32, map.height as f32);
+            let left_out = self.extract_triangles(primitive, mesh, size, (surface, index));
+            (not_finite, without_area) = (not_finite + left_out.0, without_area + left_out.1);
         }
-        let Some((normal, area)) = normal_and_area(&corners) else {
-            left_out.without_area += 1;
-            continue;
+        if not_finite > 0 {
+            let triangles = "triangles with NaN or infinite positions were left out";
+            self.warnings.push(format!("{name}: {not_finite} {triangles}"));
+        }
+        if without_area > 0 {
+            self.warnings.push(format!("{name}: {without_area} triangles without area were left out"));
+        }
+    }
+
+    /// Appends the triangles of a primitive, which has the indices `surface` and `object`, on a map of `size` texels.
+    /// Returns how many are left out because they are not finite, and because they have no area.
+    fn extract_triangles(
+        &mut self,
+        primitive: &PlacedPrimitive,
+        mesh: &TriangleMesh,
+        size: Vec2,
+        (surface, object): (u32, u32),
+    ) -> (usize, usize) {
+        let positions: Vec<Vec3> =
+            world_points(&primitive.transform, mesh).map(|point| self.space.position(point)).collect();
+        let linear = primitive.transform.matrix3;
+        let is_mirrored = linear.determinant() < 0.0;
+        let cofactor = normal_matrix(linear, is_mirrored);
+        let (mut not_finite, mut without_area) = (0, 0);
+        for [a, b, c] in mesh.triangles() {
+            let vertices = if is_mirrored { [a, c, b] } else { [a, b, c] };
+            let corners = vertices.map(|vertex| positions[vertex as usize]);
+            if !corners.iter().all(|corner| corner.is_finite()) {
+                not_finite += 1;
+                continue;
+            }
+            let Some((normal, area)) = normal_and_area(&corners) else {
+                without_area += 1;
+                continue;
+            };
+            let normals = vertices.map(|vertex| {
+                let mesh_normal = mesh.normals.get(vertex as usize).copied().unwrap_or(Vec3::ZERO);
+                let shading = (cofactor * mesh_normal.as_dvec3()).normalize_or_zero().as_vec3();
+                // The geometric normal replaces one that is zero, NaN or turned too far away from it.
+                if shading.is_finite() && shading.dot(normal) > 0.1 { shading } else { normal }
+            });
+            let uv = |vertex: u32| mesh.uv1.get(vertex as usize).copied().unwrap_or_default() * size;
+            self.triangles.push(SceneTriangle {
+                corners,
+                normal,
+                area,
+                extent: triangle_extent(&corners),
+                flat: normals.iter().all(|shading| shading.dot(normal) > 0.9999),
+                normals,
+                uv: vertices.map(uv),
+                surface,
+                object,
+                vertices,
+                two_sided: primitive.material.double_sided,
+                closed: false,
+                solid: None,
+                is_hidden_duplicate: false,
+            });
+        }
+        (not_finite, without_area)
+    }
+
+    /// Warns of a reflectance that will be clamped.
+    fn check_reflectance(&mut self, diffuse: &Vec3, textured: bool, name: &str) {
+        let warning = if diffuse.max_element() > LARGEST_REFLECTANCE && !textured {
+            format!("is above {LARGEST_REFLECTANCE} and was clamped to it")
+        } else if !diffuse.is_finite() || diffuse.min_element() < 0.0 {
+            "is negative or not a number and counts as 0".into()
+        } else {
+            return;
         };
-        let normals = vertices.map(|vertex| {
-            let mesh_normal = mesh.normals.get(vertex as usize).copied().unwrap_or(Vec3::ZERO);
-            let shading = (cofactor * mesh_normal.as_dvec3()).normalize_or_zero().as_vec3();
-            // The geometric normal replaces one that is zero, NaN or turned too far away from it.
-            if shading.is_finite() && shading.dot(normal) > 0.1 { shading } else { normal }
-        });
-        triangles.push(SceneTriangle {
-            corners,
-            normal,
-            area,
-            extent: triangle_extent(&corners),
-            flat: normals.iter().all(|shading| shading.dot(normal) > 0.9999),
-            normals,
-            uv: vertices.map(|vertex| mesh.uv1.get(vertex as usize).copied().unwrap_or_default() * size),
-            surface,
-            object,
-            vertices,
-            two_sided: primitive.material.double_sided,
-            closed: false,
-            solid: None,
-            is_hidden_duplicate: false,
-        });
+        self.warnings.push(format!("{name}: diffuse reflectance {diffuse} {warning}"));
+    }
+
+    /// Marks the triangles of closed pieces in the object whose triangles begin at `first`, and appends its rooms and
+    /// solids.
+    fn mark_closed(&mut self, first: usize) {
+        // Within an object, pieces are numbered by vertices, of which there are at most three per triangle.
+        let number = |piece: u32| 3 * first as u32 + piece;
+        let triangles = &mut self.triangles[first..];
+        let corners: Vec<[Vec3; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
+        let piece_numbers = closed_pieces(&corners);
+        let pieces = closed_shells(&corners, &piece_numbers);
+        for (triangle, piece_number) in triangles.iter_mut().zip(&piece_numbers) {
+            triangle.closed = piece_number.is_some();
+            triangle.two_sided &= piece_number.is_none();
+            let place = piece_number.and_then(|piece_number| {
+                pieces.binary_search_by_key(&piece_number, |piece| piece.number).ok()
+            });
+            triangle.solid =
+                place.filter(|&at| pieces[at].room.is_none()).map(|at| number(pieces[at].number));
+        }
+        for piece in pieces {
+            match piece.room {
+                Some(room) => self.rooms.push(room),
+                None => self.solids.push((number(piece.number), piece.bounds)),
+            }
+        }
+    }
+
+    /// Unmarks solids that contain a room, as the outside of a house does.
+    fn unmark_hollow_solids(&mut self) {
+        let (rooms, solids) = (&self.rooms, &self.solids);
+        let too_many = rooms.len().saturating_mul(solids.len()) > MAX_PAIRS;
+        if too_many {
+            self.warnings.push(format!(
+                "{} rooms and {} closed pieces are too many to tell which are in which; what a piece stands on may be lit inside of it",
+                rooms.len(),
+                solids.len()
+            ));
+        }
+        let is_hollow =
+            |(_, bounds): &&(u32, Bounds<Vec3>)| too_many || rooms.iter().any(|room| room.is_within(*bounds));
+        // In ascending order, as objects and their pieces are, which the binary search needs.
+        let hollow: Vec<u32> = solids.iter().filter(is_hollow).map(|(number, ..)| *number).collect();
+        for triangle in &mut self.triangles {
+            triangle.solid = triangle.solid.filter(|solid| hollow.binary_search(solid).is_err());
+        }
+    }
+
+    /// Marks the triangles that a coincident one replaces.
+    fn mark_hidden_duplicates(&mut self) {
+        let corners: Vec<[Vec3; 3]> = self.triangles.iter().map(|triangle| triangle.corners).collect();
+        let emits = |triangle: &SceneTriangle| {
+            let surface = &self.surfaces[triangle.surface as usize];
+            surface.emission(Side::Front, triangle.vertices, [1.0 / 3.0; 3]) != Vec3::ZERO
+        };
+        let emits: Vec<bool> = self.triangles.iter().map(emits).collect();
+        let mut count = 0;
+        for (triangle, is_hidden) in self.triangles.iter_mut().zip(is_hidden_duplicate(&corners, &emits)) {
+            triangle.is_hidden_duplicate = is_hidden;
+            count += usize::from(is_hidden);
+        }
+        if count > 0 {
+            self.warnings.push(format!(
+                "{count} triangles lie exactly on others; light meets one of each (an emitter first)"
+            ));
+        }
     }
 }
+
+/// Most pairs of rooms and solids that are tested; with more, no piece counts as a solid.
+const MAX_PAIRS: usize = 1 << 24;
 
 /// The cofactor matrix of a linear map: it transforms normals correctly under any scale. Mirrored meshes get the
 /// reversed winding, and here the opposite sign, so that their fronts stay fronts.
@@ -320,100 +409,4 @@ fn normal_and_area(corners: &[Vec3; 3]) -> Option<(Vec3, f32)> {
     let longest = (q - p).length_squared().max((r - p).length_squared()).max((r - q).length_squared());
     let normal = cross.try_normalize().filter(|_| cross.length() > 1e-9 * longest)?;
     Some((normal.as_vec3(), (0.5 * cross.length()) as f32))
-}
-
-/// A closed piece whose fronts face outward: its number and bounding box.
-type Solid = (u32, Vec3, Vec3);
-
-/// Marks the triangles of closed pieces in the object whose triangles begin at `first`, and appends its rooms and
-/// solids.
-fn mark_closed(
-    triangles: &mut [SceneTriangle],
-    first: usize,
-    rooms: &mut Vec<Room>,
-    solids: &mut Vec<Solid>,
-) {
-    // Within an object, pieces are numbered by vertices, of which there are at most three per triangle.
-    let number = |piece: u32| 3 * first as u32 + piece;
-    let triangles = &mut triangles[first..];
-    let corners: Vec<[Vec3; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
-    let piece_numbers = closed_pieces(&corners);
-    let pieces = pieces(&corners, &piece_numbers);
-    for (triangle, piece_number) in triangles.iter_mut().zip(&piece_numbers) {
-        triangle.closed = piece_number.is_some();
-        triangle.two_sided &= piece_number.is_none();
-        let place = piece_number
-            .and_then(|piece_number| pieces.binary_search_by_key(&piece_number, |piece| piece.number).ok());
-        triangle.solid = place.filter(|&at| pieces[at].room.is_none()).map(|at| number(pieces[at].number));
-    }
-    for piece in pieces {
-        match piece.room {
-            Some(room) => rooms.push(room),
-            None => solids.push((number(piece.number), piece.low, piece.high)),
-        }
-    }
-}
-
-/// Most pairs of rooms and solids that are tested; with more, no piece counts as a solid.
-const MAX_PAIRS: usize = 1 << 24;
-
-/// Unmarks solids that contain a room, as the outside of a house does.
-fn unmark_hollow_solids(
-    triangles: &mut [SceneTriangle],
-    rooms: &[Room],
-    solids: &[Solid],
-    warnings: &mut Vec<String>,
-) {
-    let too_many = rooms.len().saturating_mul(solids.len()) > MAX_PAIRS;
-    if too_many {
-        warnings.push(format!(
-            "{} rooms and {} closed pieces are too many to tell which are in which; what a piece stands on may be lit inside of it",
-            rooms.len(),
-            solids.len()
-        ));
-    }
-    let is_hollow =
-        |(_, low, high): &&Solid| too_many || rooms.iter().any(|room| room.is_within(*low, *high));
-    // In ascending order, as objects and their pieces are, which the binary search needs.
-    let hollow: Vec<u32> = solids.iter().filter(is_hollow).map(|(number, ..)| *number).collect();
-    for triangle in triangles {
-        triangle.solid = triangle.solid.filter(|solid| hollow.binary_search(solid).is_err());
-    }
-}
-
-/// Warns of a reflectance that will be clamped.
-fn check_reflectance(diffuse: &Vec3, textured: bool, name: &str, warnings: &mut Vec<String>) {
-    if diffuse.max_element() > LARGEST_REFLECTANCE && !textured {
-        warnings.push(format!(
-            "{name}: diffuse reflectance {diffuse} is above {LARGEST_REFLECTANCE} and was clamped to it"
-        ));
-    } else if !diffuse.is_finite() || diffuse.min_element() < 0.0 {
-        warnings.push(format!(
-            "{name}: diffuse reflectance {diffuse} is negative or not a number and counts as 0"
-        ));
-    }
-}
-
-/// Marks the triangles that a coincident one replaces.
-fn mark_hidden_duplicates(
-    triangles: &mut [SceneTriangle],
-    surfaces: &[SurfaceMaterial],
-    warnings: &mut Vec<String>,
-) {
-    let corners: Vec<[Vec3; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
-    let centroid = [1.0 / 3.0; 3];
-    let emits: Vec<bool> = triangles
-        .iter()
-        .map(|t| surfaces[t.surface as usize].emission(Side::Front, t.vertices, centroid) != Vec3::ZERO)
-        .collect();
-    let mut count = 0;
-    for (triangle, is_hidden_duplicate) in triangles.iter_mut().zip(is_hidden_duplicate(&corners, &emits)) {
-        triangle.is_hidden_duplicate = is_hidden_duplicate;
-        count += usize::from(is_hidden_duplicate);
-    }
-    if count > 0 {
-        warnings.push(format!(
-            "{count} triangles lie exactly on others; light meets one of each (an emitter first)"
-        ));
-    }
 }

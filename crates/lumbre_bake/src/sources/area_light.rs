@@ -11,13 +11,12 @@ use super::emitter_walk::EmitterChoice;
 use super::emitters::Emitter;
 use super::light_sources::Sources;
 use super::receiver_quadrature::ReceiverQuadrature;
+use super::sampled_receiver::{SampledReceiver, SurfacePoints};
 use super::share_variance::{share_variance, uneven_variance};
 use crate::color::channel_mean;
-use crate::sampling::Sequence;
 use crate::scene::Receiver;
-use crate::visibility::cut_out::Pieces;
-use crate::visibility::occluders::{LampOccluders, Visibility};
 use crate::visibility::visible_part::visible_part;
+use crate::visibility::{LampOccluders, PolygonClipper};
 
 /// An estimate of the visible fraction of a source's light, per channel.
 struct VisibleFraction {
@@ -51,38 +50,28 @@ impl Sources<'_> {
     pub(crate) fn area_light_irradiance(
         &self,
         nodes: &[u32],
-        visibility: &Visibility<'_>,
-        sequence: Sequence,
-        samples: u32,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        sampled: &SampledReceiver<'_, impl SurfacePoints>,
         direct: &mut Direct,
     ) -> Vec3 {
-        let Some(anchor) = point(0.5, 0.5) else { return Vec3::ZERO };
+        let Some(anchor) = (sampled.point)(0.5, 0.5) else { return Vec3::ZERO };
         let weights: Vec<f32> =
             nodes.iter().map(|&node| self.emitter_tree.weight(node, &anchor, 0.0)).collect();
         let brightest = weights.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         let mut irradiance = Vec3::ZERO;
         for (place, (&node, weight)) in nodes.iter().zip(weights).enumerate() {
-            let lamp_samples = samples_for(samples, weight / brightest);
+            let samples = samples_for(sampled.samples, weight / brightest);
             let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
             let unoccluded = || {
                 ReceiverQuadrature::mean(|x, y| {
-                    point(x, y).map(|receiver| self.emitter_tree.unoccluded(&self.emitters, node, &receiver))
+                    let receiver = (sampled.point)(x, y)?;
+                    Some(self.emitter_tree.unoccluded(&self.emitters, node, &receiver))
                 })
             };
-            let known =
-                visibility.lamps.iter().find(|occluders| occluders.node == node).and_then(|occluders| {
-                    match occluders.emitters.is_empty() {
-                        true => Some(unoccluded()),
-                        false => self.visible_past_occluders(
-                            occluders,
-                            sequence,
-                            (lamp_samples, set),
-                            point,
-                            direct,
-                        ),
-                    }
-                });
+            let occluders = sampled.visibility.lamps.iter().find(|occluders| occluders.node == node);
+            let known = occluders.and_then(|occluders| match occluders.emitters.is_empty() {
+                true => Some(unoccluded()),
+                false => self.visible_past_occluders(occluders, sampled, (samples, set), direct),
+            });
             // Relative error of approximating many emitters by one term.
             let term_error = if self.emitter_tree.emitters(node) > EXACT_EMITTERS { TERM_ERROR } else { 0.0 };
             if let Some((light, variance)) = known {
@@ -90,16 +79,15 @@ impl Sources<'_> {
                 direct.variance += variance + (term_error * channel_mean(light)).powi(2);
                 continue;
             }
-            let mut fraction =
-                self.visible_fraction(node, &anchor, sequence, (lamp_samples, set), point, direct);
+            let mut fraction = self.visible_fraction(node, &anchor, sampled, (samples, set), direct);
             if fraction.mean == Vec3::ZERO && fraction.rays > 0 {
                 continue;
             }
             let (light, uneven) = unoccluded();
             if fraction.rays == 0 && light != Vec3::ZERO {
                 // All of a few samples may have hit emitters that face away.
-                let samples = RETRY_FACTOR * lamp_samples;
-                fraction = self.visible_fraction(node, &anchor, sequence, (samples, set), point, direct);
+                let samples = RETRY_FACTOR * samples;
+                fraction = self.visible_fraction(node, &anchor, sampled, (samples, set), direct);
             }
             irradiance += light * fraction.mean;
             direct.variance += channel_mean(light).powi(2) * fraction.variance
@@ -115,19 +103,18 @@ impl Sources<'_> {
     fn visible_past_occluders(
         &self,
         occluders: &LampOccluders,
-        sequence: Sequence,
+        sampled: &SampledReceiver<'_, impl SurfacePoints>,
         (samples, set): (u32, u32),
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) -> Option<(Vec3, f32)> {
         let points = (samples / RAYS_PER_EXACT_POINT).max(BATCHES as u32);
         let (mut sums, mut counts) = ([Vec3::ZERO; BATCHES], [0u32; BATCHES]);
         let (mut least, mut most) = (f32::INFINITY, 0.0f32);
         let (mut seen, mut hidden) = (0, 0);
-        let mut pieces = Pieces::new();
+        let mut pieces = PolygonClipper::new();
         for sample in 0..points {
-            let [x, y, ..] = sequence.point(sample, set);
-            let Some(receiver) = point(x, y) else { continue };
+            let [x, y, ..] = sampled.sequence.point(sample, set);
+            let Some(receiver) = (sampled.point)(x, y) else { continue };
             let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
             let (mut light, mut is_cut) = (Vec3::ZERO, false);
             for (emitter, blockers) in &occluders.emitters {
@@ -163,9 +150,8 @@ impl Sources<'_> {
         &self,
         node: u32,
         anchor: &Receiver,
-        sequence: Sequence,
+        sampled: &SampledReceiver<'_, impl SurfacePoints>,
         (samples, set): (u32, u32),
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) -> VisibleFraction {
         let (mut all, mut seen) = (Vec3::ZERO, Vec3::ZERO);
@@ -173,8 +159,8 @@ impl Sources<'_> {
         let (mut batch_all, mut batch_seen) = ([0.0f32; BATCHES], [0.0f32; BATCHES]);
         for sample in 0..samples {
             let batch = batch_of(sample, samples);
-            let [x, y, u, v] = sequence.point(sample, set);
-            let Some(receiver) = point(x, y) else { continue };
+            let [x, y, u, v] = sampled.sequence.point(sample, set);
+            let Some(receiver) = (sampled.point)(x, y) else { continue };
             let EmitterChoice { emitter, u, probability } = self.emitter_tree.pick(node, anchor, u);
             let emitter = &self.emitters[emitter as usize];
             let Some(sample) = sample_emitter(emitter, &receiver, (u, v)) else { continue };

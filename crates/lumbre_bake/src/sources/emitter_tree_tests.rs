@@ -4,7 +4,7 @@ use lumbre_mesh::shapes;
 
 use super::*;
 use crate::sampling::{Sequence, Stream};
-use crate::scene::material::Side;
+use crate::scene::Side;
 
 fn emitter(corners: [Vec3; 3], radiance: Vec3) -> Emitter {
     let [a, b, c] = corners;

@@ -6,9 +6,8 @@ use std::collections::{BTreeMap, HashMap};
 use glam::{DVec3, Vec3};
 
 use crate::disjoint_sets::DisjointSets;
-use crate::scene::material::Side;
 use crate::scene::mean_of_points::{mean_of_points, pieces};
-use crate::scene::{BakeScene, SceneTriangle, SurfaceMaterial};
+use crate::scene::{BakeScene, SceneTriangle, Side, SurfaceMaterial, position_bits};
 
 /// A triangle of uniform radiance.
 #[derive(Clone, Debug)]
@@ -43,11 +42,9 @@ pub(crate) fn lamps(scene: &BakeScene, emitters: &[Emitter]) -> Vec<u32> {
     let mut of_triangle: HashMap<u32, u32> = HashMap::new();
     for emitter in emitters {
         of_triangle.entry(emitter.triangle).or_insert_with(|| {
-            let [a, b, c] = scene.triangles[emitter.triangle as usize].corners.map(|corner| {
-                // Adding zero turns -0 into 0, which is the same position.
-                let key = (corner + Vec3::ZERO).to_array().map(f32::to_bits);
-                *corners.entry(key).or_insert_with(|| lamps.push())
-            });
+            let [a, b, c] = scene.triangles[emitter.triangle as usize]
+                .corners
+                .map(|corner| *corners.entry(position_bits(corner)).or_insert_with(|| lamps.push()));
             let both = lamps.join(a, b);
             lamps.join(both, c)
         });
@@ -79,7 +76,7 @@ struct Coarsening {
 struct EmissionSampling {
     /// Texels along the longest edge.
     texels: f32,
-    /// Pieces along an edge.
+    /// PolygonClipper along an edge.
     pieces: u32,
     /// Points along an edge of a piece.
     points: u32,

@@ -7,9 +7,9 @@
 use std::collections::BinaryHeap;
 
 use super::emitter_bounds::BoundsLanes;
+use super::light_sources::Sources;
 use super::source_tree::clamp_below_one;
 use crate::scene::Receiver;
-use crate::sources::light_sources::Sources;
 
 /// How the sources are sampled at a piece of surface. Sources in none of the lists bring no light there.
 #[derive(Clone, Debug, Default, PartialEq)]

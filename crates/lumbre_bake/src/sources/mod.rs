@@ -16,6 +16,13 @@ pub(crate) mod light_tree;
 pub(crate) mod punctual;
 pub(crate) mod punctual_irradiance;
 pub(crate) mod receiver_quadrature;
+pub(crate) mod sampled_receiver;
 pub(crate) mod share_variance;
 pub(crate) mod shared_samples;
 pub(crate) mod source_tree;
+
+pub(crate) use direct::{Direct, VisibilitySummary};
+pub(crate) use emitters::Emitter;
+pub(crate) use light_cut::LightCut;
+pub(crate) use light_sources::Sources;
+pub(crate) use sampled_receiver::SampledReceiver;

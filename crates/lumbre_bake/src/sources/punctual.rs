@@ -5,21 +5,21 @@
 use glam::{DVec3, Vec3};
 use lumbre_optics::{BakeMode, LightKind};
 
+use super::batches::{BATCHES, batch_of, variance_of_mean};
+use super::direct::Direct;
+use super::light_sources::Sources;
 use super::punctual_irradiance::{
     PunctualIrradiance, center_irradiance, over_parallelogram, punctual_irradiance,
 };
 use super::receiver_quadrature::ReceiverQuadrature;
+use super::sampled_receiver::{SampledReceiver, SurfacePoints};
 use super::share_variance::share_variance;
 use crate::color::channel_mean;
-use crate::sampling::{Sequence, cosine_direction, frame};
+use crate::sampling::{cosine_direction, frame};
 use crate::scene::Receiver;
 use crate::scene::{BakeScene, PlacedLight};
-use crate::sources::batches::{BATCHES, batch_of, variance_of_mean};
-use crate::sources::direct::Direct;
-use crate::sources::light_sources::Sources;
-use crate::visibility::cut_out::{GAP, Pieces};
-use crate::visibility::occluders::Visibility;
-use crate::visibility::shadow_clipping::{LightVisibility, ReceiverShape};
+use crate::visibility::cut_out::GAP;
+use crate::visibility::{LightVisibility, PolygonClipper, ReceiverShape};
 
 /// Offset of the lights' ids in [`VisibilitySummary::add`](super::direct::VisibilitySummary::add); lower ids are nodes
 /// of the emitter tree.
@@ -97,46 +97,27 @@ impl LightEstimate {
 }
 
 impl Sources<'_> {
-    /// Adds the mean light over a receiver of punctual lights, given by their indices, to `direct`. Casts `samples`
-    /// shadow rays to each light, but none to lights whose possible occluders `visibility` knows.
-    pub(crate) fn punctual(
-        &self,
-        lights: &[u32],
-        visibility: &Visibility<'_>,
-        sequence: Sequence,
-        samples: u32,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
-        direct: &mut Direct,
-    ) {
-        for &index in lights {
-            self.light_irradiance(index, visibility, sequence, samples, point, direct);
-        }
-    }
-
-    /// Adds the light of one punctual light.
-    fn light_irradiance(
+    /// Adds the mean light over a receiver of a punctual light, given by its index, to `direct`. Casts no shadow rays to a
+    /// light whose possible occluders are known.
+    pub(crate) fn add_punctual(
         &self,
         index: u32,
-        visibility: &Visibility<'_>,
-        sequence: Sequence,
-        samples: u32,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        sampled: &SampledReceiver<'_, impl SurfacePoints>,
         direct: &mut Direct,
     ) {
         let placed = &self.lights[index as usize];
-        let known = visibility.of_light(index);
+        let known = sampled.visibility.of_light(index);
         let (mean, variance) = match known {
             Some(LightVisibility::Dark) => return,
             Some(LightVisibility::Hidden) => {
                 direct.seen.add(FIRST_ID + index, 0, 1);
                 return;
             }
-            Some(known) if !placed.is_sized() => self.past_shadows(index, known, visibility, point, direct),
+            Some(known) if !placed.is_sized() => self.past_shadows(index, known, sampled, direct),
             known => {
                 let clear = matches!(known, Some(LightVisibility::Clear));
-                let center =
-                    if placed.is_sized() { None } else { self.near_field_mean(placed, visibility, point) };
-                self.by_shadow_rays(index, (clear, center), sequence, samples, point, direct)
+                let center = if placed.is_sized() { None } else { self.near_field_mean(placed, sampled) };
+                self.by_shadow_rays(index, (clear, center), sampled, direct)
             }
         };
         let color = placed.light.diffuse;
@@ -154,10 +135,10 @@ impl Sources<'_> {
     fn near_field_mean(
         &self,
         light: &PlacedLight,
-        visibility: &Visibility<'_>,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        sampled: &SampledReceiver<'_, impl SurfacePoints>,
     ) -> Option<f32> {
-        over_parallelogram(self.scene, light, visibility.square.as_ref()?, &point(0.5, 0.5)?)
+        let square = sampled.visibility.square.as_ref()?;
+        over_parallelogram(self.scene, light, square, &(sampled.point)(0.5, 0.5)?)
     }
 
     /// Mean irradiance by a light per unit of its colour, and its variance, estimated by samples. Casts no rays if the
@@ -166,22 +147,20 @@ impl Sources<'_> {
         &self,
         index: u32,
         (clear, center): (bool, Option<f32>),
-        sequence: Sequence,
-        samples: u32,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        sampled: &SampledReceiver<'_, impl SurfacePoints>,
         direct: &mut Direct,
     ) -> (f32, f32) {
         let light = &self.lights[index as usize];
         let mut estimate = LightEstimate::default();
-        let sequence = sequence.of(1 + index);
-        let is_sized = light.is_sized();
+        let sequence = sampled.sequence.of(1 + index);
+        let (is_sized, samples) = (light.is_sized(), sampled.samples);
         let samples = if center.is_some() && !clear { samples.max(NEAR_SAMPLES) } else { samples };
         for sample in 0..samples {
             let [a, b, c, d] = sequence.point(sample, 0);
             let (x, y, u, v) = if is_sized { (c, d, a, b) } else { (a, b, c, d) };
-            let Some(receiver) = point(x, y) else { continue };
-            if let Some(sampled) = sample_light(self.scene, light, &receiver, (u, v), clear) {
-                estimate.add(&sampled, batch_of(sample, samples));
+            let Some(receiver) = (sampled.point)(x, y) else { continue };
+            if let Some(light_sample) = sample_light(self.scene, light, &receiver, (u, v), clear) {
+                estimate.add(&light_sample, batch_of(sample, samples));
             }
         }
         direct.rays += if clear { 0 } else { estimate.visible + estimate.hidden };
@@ -198,25 +177,25 @@ impl Sources<'_> {
         &self,
         index: u32,
         known: &LightVisibility,
-        visibility: &Visibility<'_>,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        sampled: &SampledReceiver<'_, impl SurfacePoints>,
         direct: &mut Direct,
     ) -> (f32, f32) {
         let light = &self.lights[index as usize];
         let arriving = |receiver: &Receiver| center_irradiance(self.scene, light, receiver);
+        let point = &sampled.point;
         let by_points = || ReceiverQuadrature::mean(|x, y| Some(Vec3::splat(arriving(&point(x, y)?))));
-        let unoccluded = || match self.near_field_mean(light, visibility, point) {
+        let unoccluded = || match self.near_field_mean(light, sampled) {
             Some(mean) => (Vec3::splat(mean), 0.0),
             None => by_points(),
         };
-        let (LightVisibility::Shadows(origin, shadows), Some(shape)) = (known, &visibility.receiver_shape)
-        else {
+        let shape = &sampled.visibility.receiver_shape;
+        let (LightVisibility::Shadows(origin, shadows), Some(shape)) = (known, shape) else {
             direct.seen.add(FIRST_ID + index, 1, 0);
             let (mean, variance) = unoccluded();
             return (mean.x, variance);
         };
         let Some(middle) = point(0.5, 0.5) else { return (0.0, 0.0) };
-        let (mut sum, mut lit, mut pieces) = (0.0, 0.0, Pieces::new());
+        let (mut sum, mut lit, mut pieces) = (0.0, 0.0, PolygonClipper::new());
         let is_exact = origin.lit(shape, shadows, &mut pieces, |place: DVec3, share| {
             sum += share * f64::from(arriving(&Receiver { position: place.as_vec3(), ..middle }));
             lit += share;

@@ -1,6 +1,6 @@
 //! The variance of a source's visible fraction, from batches of shadow samples. The samples are drawn elsewhere.
 
-use crate::sources::batches::{BATCHES, variance_of_mean};
+use super::batches::{BATCHES, variance_of_mean};
 
 /// Variance of the visible fraction `mean` of `samples` shadow samples, whose batches have the visible fractions
 /// `shares`.

@@ -5,16 +5,17 @@
 use glam::Vec3;
 use lumbre_optics::BakeMode;
 
+use super::batches::{BATCHES, batch_of, variance_of_mean};
+use super::direct::Direct;
+use super::emitter_sample::sample_emitter;
 use super::emitter_walk::EmitterChoice;
 use super::light_cut::{Branch, SharedSources};
+use super::light_sources::Sources;
 use super::punctual::{self, FIRST_ID};
+use super::sampled_receiver::SurfacePoints;
 use crate::color::channel_mean;
 use crate::sampling::Sequence;
 use crate::scene::Receiver;
-use crate::sources::batches::{BATCHES, batch_of, variance_of_mean};
-use crate::sources::direct::Direct;
-use crate::sources::emitter_sample::sample_emitter;
-use crate::sources::light_sources::Sources;
 
 /// The estimate by one sample: irradiance, W/m², divided by the probability of the source.
 #[derive(Clone, Copy, Debug, Default)]
@@ -92,7 +93,7 @@ impl Sources<'_> {
         shared: &SharedSources,
         sequence: Sequence,
         samples: u32,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        point: &impl SurfacePoints,
         direct: &mut Direct,
     ) {
         if shared.is_empty() {

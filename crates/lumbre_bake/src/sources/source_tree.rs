@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use crate::bounds::Bounds;
 use crate::scene::Receiver;
 
 /// The kind of a node in a binary tree over sources.
@@ -16,11 +17,8 @@ pub(crate) enum NodeKind {
 
 /// Sorts sources along the widest axis of their positions; returns how many belong to the first half.
 pub(crate) fn split_at_median(sources: &mut [u32], position: impl Fn(&u32) -> Vec3) -> usize {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let mut positioned: Vec<(Vec3, u32)> = sources.iter().map(|source| (position(source), *source)).collect();
-    for (position, _) in &positioned {
-        (low, high) = (low.min(*position), high.max(*position));
-    }
+    let Bounds::<Vec3> { low, high } = positioned.iter().map(|(position, _)| *position).collect();
     let axis = (high - low).max_position();
     positioned.sort_unstable_by(|a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
     for (source, (_, sorted)) in sources.iter_mut().zip(positioned) {

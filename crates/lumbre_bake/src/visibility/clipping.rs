@@ -1,38 +1,46 @@
 //! Clips a convex polygon to one side of a line or plane (Sutherland and Hodgman, "Reentrant Polygon Clipping", 1974),
 //! and a segment to a polygon. `cut_out` keeps both sides of a cut, in reused memory.
 
-use glam::{DVec2, DVec3};
+use std::ops::{Div, Sub};
+
+use glam::{DVec2, DVec3, Vec2};
 
 /// A corner, in the plane or in space.
 pub(crate) trait Corner: Copy {
+    /// Distances from a line or plane.
+    type Height: Copy + Default + PartialOrd + Sub<Output = Self::Height> + Div<Output = Self::Height>;
+
     /// The point at fraction `t` of the way to `other`.
-    fn towards(self, other: Self, t: f64) -> Self;
+    fn towards(self, other: Self, t: Self::Height) -> Self;
 }
 
-impl Corner for DVec2 {
-    fn towards(self, other: Self, t: f64) -> Self {
-        self.lerp(other, t)
-    }
+macro_rules! corners {
+    ($($corner:ty: $height:ty),*) => {$(
+        impl Corner for $corner {
+            type Height = $height;
+
+            fn towards(self, other: Self, t: $height) -> Self {
+                self.lerp(other, t)
+            }
+        }
+    )*};
 }
 
-impl Corner for DVec3 {
-    fn towards(self, other: Self, t: f64) -> Self {
-        self.lerp(other, t)
-    }
-}
+corners!(Vec2: f32, DVec2: f64, DVec3: f64);
 
 /// Clips a convex polygon to the points whose `height` is not below 0. Calls `keep` for each corner of the result, in
 /// order.
-pub(crate) fn clip<C: Corner>(corners: &[C], height: impl Fn(C) -> f64, mut keep: impl FnMut(C)) {
+pub(crate) fn clip<C: Corner>(corners: &[C], height: impl Fn(C) -> C::Height, mut keep: impl FnMut(C)) {
     let Some(&first) = corners.first() else { return };
+    let zero = C::Height::default();
     let mut here = height(first);
     for (place, &corner) in corners.iter().enumerate() {
         let next = corners[(place + 1) % corners.len()];
         let there = height(next);
-        if here >= 0.0 {
+        if here >= zero {
             keep(corner);
         }
-        if (here > 0.0 && there < 0.0) || (here < 0.0 && there > 0.0) {
+        if (here > zero && there < zero) || (here < zero && there > zero) {
             keep(corner.towards(next, here / (here - there)));
         }
         here = there;

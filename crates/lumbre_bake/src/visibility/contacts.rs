@@ -6,6 +6,7 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, Vec3};
 
+use crate::bounds::Bounds;
 use crate::scene::{BakeScene, SceneTriangle};
 
 /// A coordinate frame in the plane of a triangle, with its origin at the first corner and unit axes.
@@ -50,12 +51,11 @@ const LYING: f64 = 0.98;
 pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: f32) -> Vec<[DVec2; 2]> {
     let triangle = &scene.triangles[index as usize];
     let reach = REACH * f64::from(side);
-    let [a, b, c] = triangle.corners;
-    let margin = Vec3::splat(reach as f32);
-    let (low, high) = (a.min(b).min(c) - margin, a.max(b).max(c) + margin);
+    let Bounds::<Vec3> { low, high } = triangle.corners.into_iter().collect();
+    let place = Bounds { low: low - reach as f32, high: high + reach as f32 };
     let mut lines = Vec::new();
     let mut outlines: HashMap<[[u32; 3]; 2], Option<[DVec2; 2]>> = HashMap::new();
-    scene.boxes.near(low, high, |other| {
+    scene.boxes.near(&place, |other| {
         let other_triangle = &scene.triangles[other as usize];
         if other == index {
             return;

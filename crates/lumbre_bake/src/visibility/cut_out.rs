@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::shaft::Corners;
+use super::shaft::Triangle;
 
 /// Most corners of a piece; cuts that need more fail, and the caller falls back on sampling.
 const MAX_CORNERS: usize = 12;
@@ -18,12 +18,12 @@ pub(crate) const GAP: f64 = 1.0 / (1 << 16) as f64;
 
 /// A convex polygon.
 #[derive(Clone, Copy)]
-pub(crate) struct Piece {
+pub(crate) struct ConvexPolygon {
     corners: [DVec3; MAX_CORNERS],
     count: usize,
 }
 
-impl Piece {
+impl ConvexPolygon {
     const NONE: Self = Self { corners: [DVec3::ZERO; MAX_CORNERS], count: 0 };
 
     /// Appends a corner; `None` if the piece is full.
@@ -63,16 +63,16 @@ impl Piece {
 }
 
 /// The remaining pieces of a polygon, in memory that is reused from polygon to polygon.
-pub(crate) struct Pieces {
-    list: [Piece; MAX_PIECES],
+pub(crate) struct PolygonClipper {
+    list: [ConvexPolygon; MAX_PIECES],
     count: usize,
     /// Scratch memory for the piece that is being cut.
-    rest: [Piece; 2],
+    rest: [ConvexPolygon; 2],
 }
 
-impl Pieces {
+impl PolygonClipper {
     pub fn new() -> Self {
-        Self { list: [Piece::NONE; MAX_PIECES], count: 0, rest: [Piece::NONE; 2] }
+        Self { list: [ConvexPolygon::NONE; MAX_PIECES], count: 0, rest: [ConvexPolygon::NONE; 2] }
     }
 
     /// Starts over with a convex polygon; `None` if it has too many corners.
@@ -90,7 +90,7 @@ impl Pieces {
     }
 
     /// The remaining pieces.
-    pub fn list(&self) -> &[Piece] {
+    pub fn list(&self) -> &[ConvexPolygon] {
         &self.list[..self.count]
     }
 
@@ -136,7 +136,7 @@ pub(crate) struct Shadow {
 
 impl Shadow {
     /// The shadow as seen from a point, with corners relative to that point; `None` if the triangle is seen edge-on.
-    pub fn new([a, b, c]: Corners) -> Option<Self> {
+    pub fn new([a, b, c]: Triangle) -> Option<Self> {
         let volume = a.dot(b.cross(c));
         let sign = volume.signum();
         let planes = [a.cross(b), b.cross(c), c.cross(a), (b - a).cross(c - a)].map(|normal| normal * sign);
@@ -144,7 +144,7 @@ impl Shadow {
     }
 
     /// The shadow as seen from infinitely far away in the direction `towards`; `None` if the triangle is seen edge-on.
-    pub fn parallel([a, b, c]: Corners, towards: DVec3) -> Option<Self> {
+    pub fn parallel([a, b, c]: Triangle, towards: DVec3) -> Option<Self> {
         let normal = (b - a).cross(c - a);
         let volume = -normal.dot(towards);
         let sign = volume.signum();
@@ -164,7 +164,7 @@ impl Shadow {
     }
 
     /// Whether one of the planes separates the shadow from a piece.
-    fn is_beside(&self, piece: &Piece) -> bool {
+    fn is_beside(&self, piece: &ConvexPolygon) -> bool {
         (0..4).any(|side| piece.corners().iter().all(|&corner| self.height(side, corner) <= 0.0))
     }
 

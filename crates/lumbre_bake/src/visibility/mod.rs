@@ -12,3 +12,9 @@ pub(crate) mod shadow_clipping;
 pub(crate) mod shaft;
 pub(crate) mod solid_angle;
 pub(crate) mod visible_part;
+
+pub(crate) use contacts::PlaneFrame;
+pub(crate) use cut_out::{PolygonClipper, Shadow};
+pub(crate) use occluders::{LampOccluders, Visibility};
+pub(crate) use shadow_clipping::{LightVisibility, Origin, ReceiverShape};
+pub(crate) use shaft::{Area, Shaft};

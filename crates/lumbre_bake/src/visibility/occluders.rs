@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::shadow_clipping::{LightVisibility, ReceiverShape};
-use super::shaft::Corners;
+use super::shaft::Triangle;
 
 /// What is known about the visibility of sources from a receiver. Sources that are not listed need shadow rays.
 pub(crate) struct Visibility<'a> {
@@ -22,7 +22,7 @@ pub(crate) struct Visibility<'a> {
 pub(crate) struct LampOccluders {
     pub node: u32,
     /// The emitters that face the receiver, each with its possible occluders; empty if nothing occludes any of them.
-    pub emitters: Vec<(u32, Vec<Corners>)>,
+    pub emitters: Vec<(u32, Vec<Triangle>)>,
 }
 
 impl Visibility<'_> {

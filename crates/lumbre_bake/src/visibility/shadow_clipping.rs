@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::cut_out::{GAP, Piece, Pieces, Shadow};
+use super::cut_out::{ConvexPolygon, GAP, PolygonClipper, Shadow};
 
 /// Where the light comes from, in canonical units.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +61,7 @@ impl Origin {
         self,
         shape: &ReceiverShape,
         shadows: &[Shadow],
-        pieces: &mut Pieces,
+        pieces: &mut PolygonClipper,
         mut visit: impl FnMut(DVec3, f64),
     ) -> bool {
         let zero = self.zero();
@@ -88,7 +88,7 @@ impl Origin {
                 }
                 let (whole, _) = area_and_centroid(&corners);
                 if is_partly_lit(whole, pieces) {
-                    let lit = pieces.list().iter().map(Piece::corners).map(area_and_centroid);
+                    let lit = pieces.list().iter().map(ConvexPolygon::corners).map(area_and_centroid);
                     lit.for_each(|(area, centroid)| visit(zero + centroid, area / whole));
                 }
                 true
@@ -97,7 +97,7 @@ impl Origin {
     }
 
     /// Whether the shadows are known to cover a whole parallelogram.
-    pub fn hides_all(self, corners: [DVec3; 4], shadows: &[Shadow], pieces: &mut Pieces) -> bool {
+    pub fn hides_all(self, corners: [DVec3; 4], shadows: &[Shadow], pieces: &mut PolygonClipper) -> bool {
         let corners = corners.map(|corner| corner - self.zero());
         let whole = area_and_centroid(&corners).0;
         // Nothing is known about a parallelogram without area.
@@ -109,13 +109,13 @@ impl Origin {
 }
 
 /// Whether more of the area `whole` remains than the gaps that rounding leaves between adjacent shadows.
-fn is_partly_lit(whole: f64, pieces: &Pieces) -> bool {
+fn is_partly_lit(whole: f64, pieces: &PolygonClipper) -> bool {
     let lit: f64 = pieces.list().iter().map(|piece| area_and_centroid(piece.corners()).0).sum();
     whole > 0.0 && lit > GAP * whole
 }
 
 /// Cuts all shadows out of `pieces`; `false` if there are too many pieces.
-fn cut_all(pieces: &mut Pieces, shadows: &[Shadow]) -> bool {
+fn cut_all(pieces: &mut PolygonClipper, shadows: &[Shadow]) -> bool {
     for shadow in shadows {
         if pieces.cut(shadow).is_none() {
             return false;

@@ -13,7 +13,7 @@ fn floor() -> [DVec3; 4] {
 fn lit(origin: Origin, shape: &ReceiverShape, blockers: &[[DVec3; 3]]) -> (f64, DVec3) {
     let shadows: Vec<Shadow> = blockers.iter().filter_map(|&corners| origin.shadow(corners)).collect();
     let (mut share, mut moment) = (0.0, DVec3::ZERO);
-    origin.lit(shape, &shadows, &mut Pieces::new(), |place, piece_share| {
+    origin.lit(shape, &shadows, &mut PolygonClipper::new(), |place, piece_share| {
         share += piece_share;
         moment += place * piece_share;
     });
@@ -43,8 +43,8 @@ fn a_square_sheet_casts_a_square_shadow() {
     let all = Origin::Point(DVec3::Y);
     let shadows: Vec<Shadow> =
         square(0.4, 0.5).into_iter().filter_map(|corners| all.shadow(corners)).collect();
-    assert!(all.hides_all(floor(), &shadows, &mut Pieces::new()));
-    assert!(!all.hides_all(floor(), &shadows[..1], &mut Pieces::new()));
+    assert!(all.hides_all(floor(), &shadows, &mut PolygonClipper::new()));
+    assert!(!all.hides_all(floor(), &shadows[..1], &mut PolygonClipper::new()));
     assert_eq!(lit(all, &ReceiverShape::Parallelogram(floor()), &square(0.4, 0.5)).0, 0.0);
 }
 

@@ -6,6 +6,7 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::bounds::Bounds;
 use crate::sampling::frame;
 use crate::scene::BakeScene;
 
@@ -17,8 +18,8 @@ pub(crate) struct Area {
     pub normal: DVec3,
 }
 
-/// Corners of a triangle.
-pub(crate) type Corners = [DVec3; 3];
+/// Triangle of a triangle.
+pub(crate) type Triangle = [DVec3; 3];
 
 /// Distance relative to the coordinates up to which things count as touching: the offset of ray origins from surfaces.
 const CONTACT: f64 = 16.0 / (1 << 24) as f64;
@@ -36,6 +37,12 @@ struct Plane {
     height: f64,
 }
 
+/// The bounding box of some points, in single precision.
+fn bounds(points: &[DVec3]) -> Bounds<Vec3> {
+    let Bounds::<DVec3> { low, high } = points.iter().copied().collect();
+    Bounds { low: low.as_vec3(), high: high.as_vec3() }
+}
+
 /// Whether no triangle reaches into the box above an area that is as high as the area is wide and extends beyond it by
 /// as much on each side. If so, all points of the area are inside geometry or all are outside.
 pub(crate) fn is_free_before(area: &Area, scene: &BakeScene) -> bool {
@@ -48,13 +55,9 @@ pub(crate) fn is_free_before(area: &Area, scene: &BakeScene) -> bool {
     let points = [base[0], base[1], base[2], base[3]].map(|corner| [corner, corner + lift]);
     let points: [DVec3; 8] = std::array::from_fn(|at| points[at / 2][at % 2]);
     let extent = points.iter().map(|point| point.abs().max_element()).fold(0.0, f64::max);
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for point in &points {
-        (low, high) = (low.min(*point), high.max(*point));
-    }
     let sides = [area.normal, row.normalize_or_zero(), across.normalize_or_zero()];
     let mut tested = 0;
-    scene.boxes.near_while(low.as_vec3(), high.as_vec3(), |index| {
+    scene.boxes.near_while(&bounds(&points), |index| {
         tested += 1;
         let triangle = &scene.triangles[index as usize];
         let corners = triangle.corners.map(|corner| corner.as_dvec3());
@@ -104,7 +107,7 @@ const CUBE_EDGES: [[usize; 2]; 12] =
 impl Shaft {
     /// The shaft to a triangle that emits on the side of its `normal`. `None` if no light can pass, because the
     /// triangle is entirely behind the area or the area behind the triangle.
-    pub fn new(area: &Area, [p, q, r]: Corners, normal: Vec3) -> Option<Self> {
+    pub fn new(area: &Area, [p, q, r]: Triangle, normal: Vec3) -> Option<Self> {
         let mut shaft = Self::before(area, &[p, q, r]);
         let normal = normal.as_dvec3();
         let slack = shaft.slack(normal, shaft.extent);
@@ -214,7 +217,7 @@ impl Shaft {
     }
 
     /// Whether a triangle, whose largest absolute coordinate is `extent`, may reach into the shaft.
-    pub fn may_meet(&self, corners: &Corners, extent: f64) -> bool {
+    pub fn may_meet(&self, corners: &Triangle, extent: f64) -> bool {
         for (place, plane) in self.planes.iter().enumerate() {
             let slack = if place < self.touched { self.slack(plane.normal, extent) } else { 0.0 };
             let inner = plane.height - slack;
@@ -237,12 +240,8 @@ impl Shaft {
     /// The triangles of a scene that may reach into the shaft; `None` if they are more than `most`, if too many must be
     /// tested, or if one of them lets light through.
     pub fn triangles(&self, scene: &BakeScene, most: usize) -> Option<Vec<u32>> {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for point in &self.points {
-            (low, high) = (low.min(*point), high.max(*point));
-        }
         let (mut found, mut tested) = (Vec::new(), 0);
-        let is_complete = scene.boxes.near_while(low.as_vec3(), high.as_vec3(), |index| {
+        let is_complete = scene.boxes.near_while(&bounds(&self.points), |index| {
             tested += 1;
             let triangle = &scene.triangles[index as usize];
             if self.may_meet(&triangle.corners.map(|corner| corner.as_dvec3()), f64::from(triangle.extent)) {

@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3};
 
 use super::*;
 use crate::sampling::{Sequence, Stream};
-use crate::scene::material::Side;
-use crate::sources::emitters::Emitter;
+use crate::scene::Side;
+use crate::sources::Emitter;
 
 /// A unit square of the floor, centred at the origin.
 fn floor() -> Area {

@@ -4,9 +4,9 @@
 
 use glam::DVec3;
 
-use super::cut_out::{GAP, Pieces, Shadow};
+use super::cut_out::{GAP, PolygonClipper, Shadow};
 use super::polygon::{lambert, point_to_triangle};
-use super::shaft::Corners;
+use super::shaft::Triangle;
 
 /// The part of an emitter that is visible from a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,9 +22,9 @@ pub(crate) struct Visible {
 pub(crate) fn visible_part(
     point: DVec3,
     normal: DVec3,
-    emitter: &Corners,
-    blockers: &[Corners],
-    pieces: &mut Pieces,
+    emitter: &Triangle,
+    blockers: &[Triangle],
+    pieces: &mut PolygonClipper,
 ) -> Option<Visible> {
     let [p, q, r] = emitter.map(|corner| corner - point);
     // The point is behind the triangle or in its plane.
@@ -53,13 +53,13 @@ mod tests {
     use crate::sampling::{Sequence, Stream, triangle_point};
     use crate::visibility::polygon::point_to_triangle;
 
-    fn factor(point: DVec3, emitter: &Corners, blockers: &[Corners]) -> Visible {
-        let mut pieces = Pieces::new();
+    fn factor(point: DVec3, emitter: &Triangle, blockers: &[Triangle]) -> Visible {
+        let mut pieces = PolygonClipper::new();
         visible_part(point, DVec3::Y, emitter, blockers, &mut pieces).unwrap()
     }
 
     /// A triangle that emits downwards from a height.
-    fn lamp(height: f64) -> Corners {
+    fn lamp(height: f64) -> Triangle {
         [[-1.0, -1.0], [1.5, -0.5], [0.0, 1.5]].map(|[x, z]| DVec3::new(x, height, z))
     }
 
@@ -110,7 +110,7 @@ mod tests {
                 let [x, y, z, _] = sequence.of(crowd).point(3 * triangle + corner, 1);
                 DVec3::new(3.0 * f64::from(x) - 1.5, 2.2 * f64::from(y) - 0.1, 3.0 * f64::from(z) - 1.5)
             };
-            let blockers: Vec<Corners> = (0..5).map(|t| [0, 1, 2].map(|c| corner(t, c))).collect();
+            let blockers: Vec<Triangle> = (0..5).map(|t| [0, 1, 2].map(|c| corner(t, c))).collect();
             let point = DVec3::new(0.1, 0.0, -0.2);
             let visible = factor(point, &emitter, &blockers);
             let [p, q, r] = emitter;
@@ -121,7 +121,7 @@ mod tests {
                 let [u, v, ..] = sequence.point(index, 2);
                 let (u, v) = triangle_point(u, v);
                 let towards = p + (q - p) * f64::from(u) + (r - p) * f64::from(v) - point;
-                let crosses = |corners: &Corners| {
+                let crosses = |corners: &Triangle| {
                     let [a, b, c] = corners.map(|corner| corner - point);
                     let normal = (b - a).cross(c - a);
                     let t = normal.dot(a) / normal.dot(towards);
@@ -173,7 +173,7 @@ mod tests {
         let blocker = [[0.5, 0.3, -0.5], [0.5, 0.3, 0.5], [0.5, 2.0, 0.1]].map(DVec3::from);
         let one = factor(DVec3::ZERO, &emitter, &[blocker]);
         assert!(one.hidden && one.factor > 0.0);
-        let large = |corners: Corners| corners.map(|corner| corner * 1024.0);
+        let large = |corners: Triangle| corners.map(|corner| corner * 1024.0);
         assert_eq!(factor(DVec3::ZERO, &large(emitter), &[large(blocker)]), one);
     }
 }

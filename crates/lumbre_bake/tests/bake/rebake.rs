@@ -73,8 +73,9 @@ fn texels(world: &mut World) -> (Vec<DVec3>, Vec<f32>) {
 }
 
 fn baked(mut world: World, former: Option<&Samples>, options: &BakeOptions) -> (World, BakeReport, Samples) {
-    let (report, samples) =
-        Bake::new(options).former(former).run_keeping_samples(&mut world).expect("the rooms bake");
+    let mut samples = None;
+    let bake = Bake::new(options).former(former).keep_samples(&mut samples);
+    let report = bake.run(&mut world).expect("the rooms bake");
     (world, report, samples.expect("there is light"))
 }
 
@@ -310,20 +311,23 @@ fn the_same_bits_on_any_number_of_threads_from_a_file_and_after_an_interruption(
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         })
-        .run_keeping_samples(&mut world);
+        .keep_samples(&mut None)
+        .run(&mut world);
     assert!(interrupted.is_err());
-    let (report, _) = Bake::new(&options())
+    let report = Bake::new(&options())
         .former(&read)
         .checkpoint(&checkpoint(true))
-        .run_keeping_samples(&mut world)
+        .keep_samples(&mut None)
+        .run(&mut world)
         .expect("the bake resumes");
     assert!(report.resumed_seconds > 0.0);
     assert_eq!(report.warnings, Vec::<String>::new());
     assert!(texels(&mut world).0 == expected, "the interruption leaves the bits as they are");
     // A full bake of the same scene does not resume from the checkpoint of a rebake.
-    let (report, _) = Bake::new(&options())
+    let report = Bake::new(&options())
         .checkpoint(&checkpoint(true))
-        .run_keeping_samples(&mut rooms(LAMP, &[moved]))
+        .keep_samples(&mut None)
+        .run(&mut rooms(LAMP, &[moved]))
         .expect("it bakes");
     assert!(report.warnings.iter().any(|w| w.contains("another")), "{:?}", report.warnings);
 }

@@ -265,25 +265,11 @@ fn triangles(mode: u32, mut order: Vec<u32>) -> Vec<u32> {
 /// Gives every triangle its own vertices with the face normal, as the specification requires for meshes
 /// without normals (section 3.7.2.1). Degenerate triangles get the zero vector.
 fn flat(mesh: &TriangleMesh) -> TriangleMesh {
-    fn split<T: Copy>(values: &[T], indices: &[u32]) -> Vec<T> {
-        if values.is_empty() {
-            Vec::new()
-        } else {
-            indices.iter().map(|&index| values[index as usize]).collect()
-        }
-    }
     let normals = mesh
         .triangles()
         .flat_map(|corners| [face_normal(mesh, corners).try_normalize().unwrap_or(Vec3::ZERO); 3]);
-    TriangleMesh {
-        positions: split(&mesh.positions, &mesh.indices),
-        normals: normals.collect(),
-        tangents: split(&mesh.tangents, &mesh.indices),
-        uv0: split(&mesh.uv0, &mesh.indices),
-        uv1: split(&mesh.uv1, &mesh.indices),
-        colors: split(&mesh.colors, &mesh.indices),
-        indices: (0u32..).take(mesh.indices.len()).collect(),
-    }
+    let indices = (0u32..).take(mesh.indices.len()).collect();
+    TriangleMesh { normals: normals.collect(), ..mesh.with_vertices(&mesh.indices, indices) }
 }
 
 /// The unit normal of a triangle; zero if the triangle is degenerate. Computed in f64, where products of f32

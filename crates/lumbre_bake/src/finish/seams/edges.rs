@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use crate::scene::BakeScene;
+use crate::scene::{BakeScene, position_bits};
 
 /// An edge of a triangle on the border of its chart.
 #[derive(Clone, Copy, Debug)]
@@ -33,8 +33,8 @@ pub(crate) fn borders(scene: &BakeScene) -> Vec<Edge> {
             continue;
         }
         let ids: [u32; 3] = std::array::from_fn(|corner| {
-            // Adding 0 turns -0 into 0, so that both are one place.
-            let [x, y, z] = (triangle.corners[corner] + Vec3::ZERO).to_array().map(f32::to_bits);
+            let [x, y, z] = position_bits(triangle.corners[corner]);
+            // Adding zero turns -0 into 0.
             let [u, v] = (triangle.uv[corner] + Vec2::ZERO).to_array().map(f32::to_bits);
             let next = corners.len() as u32;
             *corners.entry([triangle.object, x, y, z, u, v]).or_insert(next)

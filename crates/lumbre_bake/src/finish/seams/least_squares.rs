@@ -12,11 +12,12 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::MapValues;
 use super::samples::{Reading, Sample};
-use super::{MapValues, Maps, NO_CHART};
+use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
 use crate::conjugate_gradients::{self, System};
-use crate::finish::fill::texels_within;
+use crate::coverage::CoveredTexels;
 use crate::report::SeamReport;
 use crate::texel_index::MapTexel;
 
@@ -66,7 +67,7 @@ struct Equation {
 }
 
 impl Unknowns {
-    pub fn new(maps: &Maps<'_>, charts: &[u32], shown: &MapValues<'_>, samples: &[Sample]) -> Self {
+    pub fn new(covered: &CoveredTexels<'_>, shown: &MapValues<'_>, samples: &[Sample]) -> Self {
         let read = |side: &Reading| {
             let texels = side.texels.into_iter().zip(side.weights);
             texels.filter(|(_, weight)| *weight > 0.0).map(|(texel, _)| texel)
@@ -75,7 +76,7 @@ impl Unknowns {
             samples.iter().flat_map(|sample| sample.sides.iter().flat_map(read)).collect();
         texels.sort_unstable();
         texels.dedup();
-        let variances = texels.iter().map(|&texel| variance(maps, charts, shown, texel)).collect();
+        let variances = texels.iter().map(|&texel| variance(covered, shown, texel)).collect();
         Self { texels, variances }
     }
 
@@ -173,33 +174,35 @@ fn squared_jump(equations: &[Equation], values: &[f64]) -> f64 {
 }
 
 /// The variance of each channel of a texel: how far it may be off, squared.
-fn variance(maps: &Maps<'_>, charts: &[u32], shown: &MapValues<'_>, texel: MapTexel) -> DVec3 {
+fn variance(texels: &CoveredTexels<'_>, shown: &MapValues<'_>, texel: MapTexel) -> DVec3 {
     let MapValues { light: filled, variances } = shown;
-    let Some(map) = maps.layout.maps.iter().rev().find(|map| map.first <= texel.place()) else {
+    let Some(map) = texels.layout.maps.iter().rev().find(|map| map.first <= texel.place()) else {
         return DVec3::ZERO;
     };
     let local = texel.0 - map.first as u32;
     let (x, y) = (local % map.width, local / map.width);
-    let chart = charts[texel.place()];
-    let (mut low, mut high, mut stated) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
-    for (nx, ny) in texels_within(map.width, map.height, x, y, 1) {
-        let other = map.texel(nx, ny).place();
+    let chart = texels.chart_at(texel);
+    let (mut values, mut stated) = (Bounds::<Vec3>::default(), 0.0f32);
+    for other in map.neighbourhood(x, y, 1) {
         // A texel beside a chart has the range and the error of whatever charts lie around it.
-        let is_same_chart = charts[other] != NO_CHART && (chart == NO_CHART || charts[other] == chart);
+        let other_chart = texels.chart_at(other);
+        let is_same_chart = other_chart.is_some() && (chart.is_none() || other_chart == chart);
+        let other = other.place();
         if is_same_chart && filled[other].is_finite() {
-            (low, high) = (low.min(filled[other]), high.max(filled[other]));
+            values.extend([filled[other]]);
             // The error of a texel that shows no surface is NaN, which `max` ignores.
             stated = stated.max(variances[other]);
         }
     }
-    if chart != NO_CHART {
+    if chart.is_some() {
         stated = variances[texel.place()].max(0.0);
     }
+    let Bounds { low, high } = values;
     let range = if low.x <= high.x { (high - low).as_dvec3() } else { DVec3::ZERO };
     let slope = range * HALF_A_TEXEL;
     let variance = slope * slope + f64::from(stated);
     let variance = if variance.is_finite() { variance } else { DVec3::ZERO };
-    if chart == NO_CHART { variance * BESIDE_CHART } else { variance }
+    if chart.is_none() { variance * BESIDE_CHART } else { variance }
 }
 
 /// The linear system for the changes of one channel.

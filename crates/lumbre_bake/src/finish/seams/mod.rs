@@ -19,22 +19,11 @@ mod samples;
 
 use glam::Vec3;
 
-use crate::coverage::footprint::Texel;
+use crate::coverage::CoveredTexels;
 use crate::monitor::BakeMonitor;
-use crate::report::SeamReport;
-use crate::scene::{BakeScene, LightmapLayout};
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::report::{SeamReport, StageNotes};
+use crate::{BakeError, BakeOptions};
 use least_squares::{Patience, Unknowns};
-
-/// The scene and the layout of its maps, for closing seams.
-pub(crate) struct Maps<'a> {
-    pub scene: &'a BakeScene,
-    pub layout: &'a LightmapLayout,
-    pub texels: &'a [Texel],
-    pub charts: &'a [u32],
-    /// Mean irradiance of the open texels, mean of the channels.
-    pub mean: f64,
-}
 
 /// The values of the maps, per texel of all maps.
 pub(crate) struct MapValues<'a> {
@@ -44,64 +33,42 @@ pub(crate) struct MapValues<'a> {
     pub variances: &'a mut [f32],
 }
 
-/// The chart of a texel that shows no surface in the open.
-const NO_CHART: u32 = u32::MAX;
-
-/// The outcome of closing seams.
-struct Closed {
-    /// What was done, or the reason why nothing was.
-    pub report: Result<SeamReport, &'static str>,
-    pub rays: u64,
-    /// A warning if some edges were not compared with all others.
-    pub warning: Option<String>,
-}
-
 /// Closes the seams of the maps, unless that is switched off, and reports the outcome. How far a texel is moved is
-/// added to its error.
-///
-/// # Errors
-/// [`BakeError::Cancelled`].
+/// added to its error. `mean` is the mean irradiance of the open texels, mean of the channels.
 pub(crate) fn close_seams(
-    maps: &Maps<'_>,
+    texels: &CoveredTexels<'_>,
+    mean: f64,
     shown: MapValues<'_>,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
-    report: &mut BakeReport,
-) -> Result<(), BakeError> {
+) -> Result<(SeamReport, StageNotes), BakeError> {
     if !options.seams {
-        report.skipped.push("seams: switched off".into());
-        return Ok(());
+        return Ok((SeamReport::default(), StageNotes::of_skipped("seams: switched off")));
     }
     let patience = if monitor.clock().is_over() { Patience::LATE } else { Patience::WHOLE };
-    let closed = monitor.run_interruptible(0.0, || close(maps, shown, patience))?;
-    report.rays += closed.rays;
-    report.warnings.extend(closed.warning);
-    match closed.report {
-        Ok(closed) => report.seams = closed,
-        Err(reason) => report.skipped.push(format!("seams: {reason}")),
-    }
-    Ok(())
+    monitor.run_interruptible(0.0, || close(texels, mean, shown, patience))
 }
 
-fn close(maps: &Maps<'_>, shown: MapValues<'_>, patience: Patience) -> Closed {
-    if maps.mean.is_nan() || maps.mean <= 0.0 {
-        return Closed { report: Err("the maps are black"), rays: 0, warning: None };
+fn close(
+    texels: &CoveredTexels<'_>,
+    mean: f64,
+    shown: MapValues<'_>,
+    patience: Patience,
+) -> (SeamReport, StageNotes) {
+    if mean.is_nan() || mean <= 0.0 {
+        return (SeamReport::default(), StageNotes::of_skipped("seams: the maps are black"));
     }
-    let edges = edges::borders(maps.scene);
-    let mut charts = vec![NO_CHART; maps.layout.texels];
-    for texel in maps.texels.iter().filter(|texel| !texel.is_hidden()) {
-        charts[texel.index.place()] = maps.charts[texel.triangle as usize];
+    let edges = edges::borders(texels.scene);
+    let seams = samples::Sampling { texels, filled: shown.light, edges: &edges }.all();
+    let mut notes = StageNotes::of_rays(seams.rays);
+    if seams.crowded > 0 {
+        notes.warnings.push(format!("so many borders of charts lie in one place that {} of them were not compared with all others; seams may show there", seams.crowded));
     }
-    let seams = samples::Sampling { maps, charts: &charts, filled: shown.light, edges: &edges }.all();
-    let (rays, crowded) = (seams.rays, seams.crowded);
-    let warning = (crowded > 0).then(|| {
-        format!("so many borders of charts lie in one place that {crowded} of them were not compared with all others; seams may show there")
-    });
     if seams.samples.is_empty() {
-        return Closed { report: Err("no two borders of charts join smoothly in one place"), rays, warning };
+        notes.skipped.push("seams: no two borders of charts join smoothly in one place".into());
+        return (SeamReport::default(), notes);
     }
-    let unknowns = Unknowns::new(maps, &charts, &shown, &seams.samples);
-    let mut report = unknowns.solve(&seams.samples, shown, maps.mean, patience, &maps.scene.stop);
-    report.edges = seams.pairs;
-    Closed { report: Ok(report), rays, warning }
+    let unknowns = Unknowns::new(texels, &shown, &seams.samples);
+    let report = unknowns.solve(&seams.samples, shown, mean, patience, &texels.scene.stop);
+    (SeamReport { edges: seams.pairs, ..report }, notes)
 }

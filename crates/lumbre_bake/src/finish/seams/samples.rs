@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::edge_grid::EdgeGrid;
 use super::edges::Edge;
-use super::{Maps, NO_CHART};
+use crate::coverage::CoveredTexels;
 use crate::texel_index::MapTexel;
 
 /// Edges nearer to each other than this are in one place, canonical units: 64 roundings of the largest coordinate,
@@ -28,7 +28,7 @@ const SAME_READING: f32 = 1e-3;
 const NEGLIGIBLE: f32 = 1.0 / 1024.0;
 
 /// What bilinear filtering reads at a point: four texels and their weights.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Reading {
     pub texels: [MapTexel; 4],
     /// Each in [0, 1]; their sum is 1.
@@ -56,9 +56,7 @@ pub(crate) struct SeamSamples {
 
 /// The search for samples.
 pub(crate) struct Sampling<'a> {
-    pub maps: &'a Maps<'a>,
-    /// Per texel of all maps.
-    pub charts: &'a [u32],
+    pub texels: &'a CoveredTexels<'a>,
     pub filled: &'a [Vec3],
     pub edges: &'a [Edge],
 }
@@ -71,7 +69,7 @@ impl Sampling<'_> {
             let mut samples = SeamSamples::default();
             let (near, is_crowded) = grid.near(index);
             samples.crowded = usize::from(is_crowded);
-            for other in near.into_iter().take_while(|_| !self.maps.scene.stop.is_cancelled()) {
+            for other in near.into_iter().take_while(|_| !self.texels.scene.stop.is_cancelled()) {
                 let before = samples.samples.len();
                 samples.rays += self.between(index, other, &mut samples.samples);
                 samples.pairs += usize::from(samples.samples.len() > before);
@@ -122,7 +120,7 @@ impl Sampling<'_> {
                 continue;
             }
             let uv = [(long, s), (short, t)].map(|(edge, t)| edge.uv[0].lerp(edge.uv[1], t));
-            let scene = self.maps.scene;
+            let scene = self.texels.scene;
             let objects = [long, short].map(|edge| scene.triangles[edge.triangle as usize].object);
             if objects[0] == objects[1] && (uv[0] - uv[1]).abs().max_element() < SAME_READING {
                 continue;
@@ -147,13 +145,13 @@ impl Sampling<'_> {
 
     /// What bilinear filtering reads at a place of a map, if all its texels are known and none is another chart's.
     fn reading(&self, edge: &Edge, uv: Vec2) -> Option<Reading> {
-        let triangle = &self.maps.scene.triangles[edge.triangle as usize];
-        let map = &self.maps.layout.maps[triangle.object as usize];
-        let chart = self.maps.charts[edge.triangle as usize];
+        let triangle = &self.texels.scene.triangles[edge.triangle as usize];
+        let map = &self.texels.layout.maps[triangle.object as usize];
+        let chart = self.texels.charts[edge.triangle as usize];
         let at = uv - 0.5;
         let low = at.floor();
         let fraction = at - low;
-        let mut reading = Reading { texels: [MapTexel::NONE; 4], weights: [0.0; 4] };
+        let mut reading = Reading::default();
         let mut sum = 0.0;
         for corner in 0..4 {
             let step = Vec2::new((corner % 2) as f32, (corner / 2) as f32);
@@ -166,8 +164,8 @@ impl Sampling<'_> {
             if weight < NEGLIGIBLE {
                 continue;
             }
-            let owner = self.charts[texel.place()];
-            if !self.filled[texel.place()].is_finite() || (owner != chart && owner != NO_CHART) {
+            let is_of_other = self.texels.chart_at(texel).is_some_and(|owner| owner != chart);
+            if !self.filled[texel.place()].is_finite() || is_of_other {
                 return None;
             }
             reading.weights[corner] = weight;

@@ -1,0 +1,275 @@
+//! Direct light of the sources that matter by themselves: each is sampled individually, with shadow rays where its
+//! occluders are not known. Which passes are made, and for which errors, is in the parent module.
+
+use std::collections::{BTreeSet, HashMap};
+
+use super::light_cuts::LightCuts;
+use super::local_light::LocalLight;
+use super::shafts::Shafts;
+use super::shared_light::SharedLight;
+use crate::chunks::{decide, in_chunks};
+use crate::coverage::{CoveredTexels, Texel, receiver};
+use crate::denoise::Neighbourhoods;
+use crate::monitor::BakeMonitor;
+use crate::sample_allocation::{SampleAllocation, SampleAllocator, take_samples};
+use crate::sampling::{Sequence, Stream};
+use crate::sources::{Direct, SampledReceiver, Sources, VisibilitySummary};
+use crate::texel_index::{CoveredTexel, MapTexel};
+use crate::{BakeError, BakeOptions};
+
+/// The direct light of the individually sampled sources, as far as it has been sampled.
+pub(crate) struct IndividualLight {
+    /// Per covered texel.
+    pub direct: Vec<Direct>,
+    /// Samples that have been taken, per covered texel.
+    samples: Vec<u32>,
+    /// The texels that may need more samples than the first pass takes.
+    pub doubtful: Vec<CoveredTexel>,
+}
+
+impl IndividualLight {
+    /// Allocates `many` samples to each doubtful texel that has had fewer.
+    pub fn with_fewer_samples(&self, many: u32) -> Vec<SampleAllocation> {
+        let fewer = self.doubtful.iter().filter(|texel| self.samples[texel.place()] < many);
+        fewer.map(|&texel| SampleAllocation { texel, samples: many }).collect()
+    }
+    /// The expected variances relative to the squared local light.
+    fn relative_variances(&self, local: &LocalLight) -> Vec<f32> {
+        let variances: Vec<f32> = self.direct.iter().map(|direct| direct.variance - direct.caution).collect();
+        local.relative(&variances)
+    }
+
+    /// The sum of the texels' expected variances, each relative to the squared local light.
+    pub fn variance_left(&self, local: &LocalLight) -> f64 {
+        sum(&self.relative_variances(local))
+    }
+}
+
+/// Samples the direct light of the texels that are not known from a previous bake, with everything that all passes
+/// need.
+pub(crate) struct SourceSampler<'a> {
+    sources: &'a Sources<'a>,
+    texels: &'a CoveredTexels<'a>,
+    known: &'a [Option<Direct>],
+    options: &'a BakeOptions,
+    pub cuts: LightCuts,
+    shafts: Shafts<'a>,
+}
+
+impl<'a> SourceSampler<'a> {
+    pub fn new(
+        sources: &'a Sources<'a>,
+        texels: &'a CoveredTexels<'a>,
+        known: &'a [Option<Direct>],
+        options: &'a BakeOptions,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<Self, BakeError> {
+        let mut cuts = monitor.run_interruptible(1.0, || LightCuts::new(sources, texels))?;
+        let is_wanted = |texel: CoveredTexel| known_light(known, texel).is_none();
+        let shafts =
+            monitor.run_interruptible(1.0, || Shafts::new(sources, &texels.list, &cuts, is_wanted))?;
+        // Where shadow rays would be needed anyway, one ray to any of the sources is worth as much as one to each of
+        // them. Not so where all lamps have samples of their own: the unoccluded sum over them is exact, and rays only
+        // find the visible share of it.
+        cuts.share(sources, &shafts.unresolved(&cuts, |_, cut| !cut.has_all_lamps));
+        Ok(Self { sources, texels, known, options, cuts, shafts })
+    }
+
+    fn is_wanted(&self, texel: CoveredTexel) -> bool {
+        known_light(self.known, texel).is_none()
+    }
+
+    /// The texels whose light is not known from a previous bake.
+    pub fn unknown(&self) -> impl Iterator<Item = CoveredTexel> {
+        CoveredTexel::all(self.texels.list.len()).filter(|&texel| self.is_wanted(texel))
+    }
+
+    /// The light of the individually sampled sources at a texel, by so many samples of each.
+    fn light(&self, covered: CoveredTexel, samples: u32) -> Direct {
+        let texel = &self.texels.list[covered.place()];
+        if texel.is_hidden() {
+            return Direct::default();
+        }
+        let scene = self.sources.scene;
+        let sampled = SampledReceiver {
+            point: |x: f32, y: f32| texel.point(scene, x, y).map(|point| receiver(scene, &point)),
+            visibility: &self.shafts.visibility(covered.place(), texel),
+            sequence: Sequence::new(self.options.seed, Stream::DirectLight, texel.index.0),
+            samples,
+        };
+        self.sources.irradiance_per_source(self.cuts.of(covered), &sampled)
+    }
+
+    /// The light of texels by a few samples, whatever time it takes.
+    fn few_samples(
+        &self,
+        texels: &[CoveredTexel],
+        few: u32,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<Vec<Direct>, BakeError> {
+        let clock = monitor.clock();
+        monitor.pass(PASS);
+        in_chunks(texels.len(), monitor, |place| {
+            self.light(texels[place], if clock.is_over() { few.min(LATE_SAMPLES) } else { few })
+        })
+    }
+
+    /// Known light, and a few samples of every other texel: a complete map, whatever time it takes.
+    pub fn first_pass(&self, monitor: &mut BakeMonitor<'_>) -> Result<IndividualLight, BakeError> {
+        let unknown: Vec<CoveredTexel> = self.unknown().collect();
+        let [usual, ..] = self.options.effort().direct;
+        let is_time_short = decide(monitor, monitor.clock().is_past(SHORT_OF_TIME))?;
+        let few = if is_time_short { usual.min(LATE_SAMPLES) } else { usual };
+        let sampled = self.few_samples(&unknown, few, monitor)?;
+        let count = self.texels.list.len();
+        let mut direct: Vec<Direct> = CoveredTexel::all(count)
+            .map(|texel| known_light(self.known, texel).unwrap_or_default())
+            .collect();
+        for (texel, light) in unknown.iter().zip(sampled) {
+            direct[texel.place()] = light;
+        }
+        Ok(IndividualLight { direct, samples: vec![usual; count], doubtful: Vec::new() })
+    }
+
+    /// Makes lamps share samples in blocks that lie in their penumbrae for the most part: behind a grille, or among
+    /// many thin blockers. The visible share of each texel by itself would take hundreds of rays, while smoothing makes
+    /// use of the neighbours' samples. The light of these blocks is sampled again.
+    pub fn share_penumbrae(
+        &mut self,
+        direct: &mut [Direct],
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<(), BakeError> {
+        let lamps = monitor.run_interruptible(0.0, || {
+            let mut lamps = self.shafts.unresolved(&self.cuts, |_, cut| cut.has_all_lamps);
+            if lamps.is_empty() {
+                return lamps;
+            }
+            // Per block, its texels outside of penumbrae less those in them.
+            let mut balance: HashMap<u32, i64> = HashMap::new();
+            for texel in self.unknown().filter(|texel| !self.texels.list[texel.place()].is_hidden()) {
+                let change = if direct[texel.place()].seen.partly { -1 } else { 1 };
+                *balance.entry(self.cuts.block(texel)).or_default() += change;
+            }
+            lamps.retain(|(texel, _)| {
+                balance.get(&self.cuts.block(*texel)).is_some_and(|balance| *balance < 0)
+            });
+            self.cuts.share(self.sources, &lamps);
+            lamps
+        })?;
+        if lamps.is_empty() {
+            return Ok(());
+        }
+        let blocks: BTreeSet<u32> = lamps.iter().map(|(texel, _)| self.cuts.block(*texel)).collect();
+        let changed: Vec<CoveredTexel> =
+            self.unknown().filter(|texel| blocks.contains(&self.cuts.block(*texel))).collect();
+        let [few, ..] = self.options.effort().direct;
+        for (texel, light) in changed.iter().zip(self.few_samples(&changed, few, monitor)?) {
+            // What was seen before tells the neighbours that a penumbra is near.
+            let Direct { rays, seen, .. } = direct[texel.place()];
+            direct[texel.place()] = Direct { rays: rays + light.rays, seen, ..light };
+        }
+        Ok(())
+    }
+
+    /// The first round of the sources that share samples; `None` if there are none.
+    pub fn shared_light(&self, monitor: &mut BakeMonitor<'_>) -> Result<Option<SharedLight<'_>>, BakeError> {
+        if !self.cuts.share_samples() {
+            return Ok(None);
+        }
+        let is_wanted = |place: usize| self.is_wanted(CoveredTexel::new(place));
+        // Texels with known light have no shared samples, so the others must not be compared with them.
+        let keys = self.cuts.keys().into_iter().enumerate();
+        let groups: Vec<u32> = keys.map(|(place, key)| 2 * key + u32::from(is_wanted(place))).collect();
+        let neighbourhoods = Neighbourhoods::new(self.texels, &groups);
+        monitor.pass(PASS);
+        let shared =
+            SharedLight::new(self.sources, neighbourhoods, &self.cuts, is_wanted, self.options, monitor)?;
+        Ok(Some(shared))
+    }
+
+    /// The texels in or near penumbras, as far as the first pass has found them: those that have, within [`REACH`], a
+    /// texel (perhaps themselves) that saw a source partly, or one that saw other sources than they did.
+    pub fn doubtful_texels(&self, direct: &[Direct]) -> Vec<CoveredTexel> {
+        let texels = self.texels;
+        let seen_at = |place: MapTexel| texels.open_at(place).map(|texel| direct[texel.place()].seen);
+        let is_doubtful = |&(covered, texel): &(CoveredTexel, &Texel)| {
+            let Direct { seen, sampled, .. } = direct[covered.place()];
+            let map = &texels.layout.maps[texel.object as usize];
+            let differs = |other: VisibilitySummary| other.partly || other.signature != seen.signature;
+            let mut near = map.neighbourhood(texel.x, texel.y, REACH);
+            sampled && self.is_wanted(covered) && near.any(|near| seen_at(near).is_some_and(differs))
+        };
+        texels.open().filter(is_doubtful).map(|(covered, _)| covered).collect()
+    }
+
+    /// Takes more samples of doubtful texels, up to `most`, mostly at the edges of shadows, until the sum of squared
+    /// errors is down to `goal`, no texel can have more, or the time is up.
+    pub fn refine(
+        &self,
+        light: &mut IndividualLight,
+        local: &LocalLight,
+        most: u32,
+        goal: f64,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<(), BakeError> {
+        loop {
+            let variances = light.relative_variances(local);
+            if sum(&variances) <= goal {
+                return Ok(());
+            }
+            let (texels, samples) = (&light.doubtful, &light.samples);
+            let allocator = SampleAllocator { texels, variances: &variances, samples, most, order: ORDER };
+            let allocated = allocator.reach(goal);
+            if self.sample(&allocated, light, monitor)? == 0 {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Samples the texels of a list anew, as far as there is time; returns for how many of them there was. Their rays
+    /// add up.
+    pub fn sample(
+        &self,
+        wanted: &[SampleAllocation],
+        light: &mut IndividualLight,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<usize, BakeError> {
+        if wanted.is_empty() {
+            return Ok(0);
+        }
+        monitor.pass(PASS);
+        let taken = take_samples(wanted, &mut light.direct, monitor, |to, before| {
+            let sampled = self.light(to.texel, to.samples);
+            Direct { rays: before.rays + sampled.rays, ..sampled }
+        })?;
+        for SampleAllocation { texel, samples } in taken {
+            light.samples[texel.place()] = *samples;
+        }
+        Ok(taken.len())
+    }
+}
+
+/// The light of a texel from a previous bake.
+fn known_light(known: &[Option<Direct>], texel: CoveredTexel) -> Option<Direct> {
+    known.get(texel.place()).copied().flatten()
+}
+
+/// How far around a texel that saw a penumbra others may be in it too, in texels.
+const REACH: u32 = 2;
+
+/// The power of the number of samples with which the variance falls at straight edges of shadows, as measured.
+pub(crate) const ORDER: f64 = 1.5;
+
+/// A pass's usual share of the time that it and the passes after it take.
+const PASS: f32 = 0.5;
+
+/// If more than this share of the time for direct light has passed before any is computed, time is short for a scene of
+/// this size.
+pub(crate) const SHORT_OF_TIME: f64 = 0.3;
+
+/// Shadow rays of a texel in the first pass if time is short or over: still enough to estimate the error from their spread.
+const LATE_SAMPLES: u32 = 4;
+
+fn sum(numbers: &[f32]) -> f64 {
+    numbers.iter().map(|&number| f64::from(number)).sum()
+}

@@ -1,0 +1,21 @@
+//! A receiver of direct light with the samples that its light is computed by. The light itself is computed in
+//! `irradiance`.
+
+use crate::sampling::Sequence;
+use crate::scene::Receiver;
+use crate::visibility::Visibility;
+
+/// Maps the unit square onto the surface of a receiver; `None` where it has none.
+pub(crate) trait SurfacePoints: Fn(f32, f32) -> Option<Receiver> {}
+
+impl<F: Fn(f32, f32) -> Option<Receiver>> SurfacePoints for F {}
+
+/// A piece of surface that receives direct light as a whole, and how it is sampled.
+pub(crate) struct SampledReceiver<'a, P: SurfacePoints> {
+    pub point: P,
+    /// What is known of the occluders between it and the sources.
+    pub visibility: &'a Visibility<'a>,
+    pub sequence: Sequence,
+    /// Shadow rays to each source that is sampled individually.
+    pub samples: u32,
+}
