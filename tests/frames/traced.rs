@@ -5,15 +5,16 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DQuat, DVec2, DVec3, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::{Fog, FogMode, Light, Material, ReflectionModel, Shading, Surface};
+use lumbre_optics::{AlphaMode, Fog, FogMode, Light, Material, ReflectionModel, Shading, Surface};
 use lumbre_render::{Display, FrameOptions};
 use lumbre_scene::{Camera, EmissiveLight, Mesh, SceneSettings, Transform};
 use lumbre_tests::compare::{Difference, compare};
+use lumbre_tests::panes::{pane, perspective};
 use lumbre_tests::scenes::{ball, every_light};
 use lumbre_tests::twin::{self, TwinOptions};
-use lumbre_trace::{Picture, TraceOptions, trace};
+use lumbre_trace::{Picture, TraceOptions, Tracer, trace};
 
 use crate::adapter::{draw, linear, shown};
 
@@ -146,6 +147,67 @@ fn the_level_is_the_frames_but_for_minified_textures() {
     let at = |share: f64| apart[(share * (apart.len() - 1) as f64) as usize];
     println!("tour 06: median {:.1e}, 75 % {:.1e}, 95 % {:.1e} apart", at(0.5), at(0.75), at(0.95));
     assert!(at(0.5) < STEP, "{}", at(0.5));
+}
+
+/// Half the sides of the square decals, in metres: slightly larger the younger they are, so that frames too, which
+/// draw the nearest bounding ball last, draw them in the order of their age.
+const DECALS: [f64; 3] = [0.58, 0.6, 0.62];
+
+#[test]
+fn decals_in_the_plane_of_a_wall_are_the_frames() {
+    // In the plane z = 0, which faces the camera: all depths of a frame are the same number, so that rounding does
+    // not decide there what is visible.
+    let mut world = World::new();
+    world.spawn(perspective());
+    world.spawn((every_light().swap_remove(2).1, Transform::from_xyz(1.0, 1.5, 2.0)));
+    let sheet = |half_side: f64, turn: DQuat| {
+        let mut mesh = pane();
+        for position in &mut mesh.positions {
+            *position = (turn * (half_side * position.as_dvec3())).as_vec3();
+        }
+        Mesh(Arc::new(mesh))
+    };
+    let plastic = |color: Vec3| Material::from_metallic_roughness(color, 0.0, 0.4);
+    world.spawn((sheet(3.0, DQuat::IDENTITY), plastic(Vec3::splat(0.7))));
+    let turns = [0.0, 0.5, 1.1].map(DQuat::from_rotation_z);
+    for ((turn, half_side), alpha) in turns.into_iter().zip(DECALS).zip([0.7, 0.3, 0.5]) {
+        let color = Vec3::new(alpha, 0.8 - alpha, 0.2);
+        let material = Material { alpha, alpha_mode: AlphaMode::Blend, ..plastic(color) };
+        world.spawn((sheet(half_side, turn), material));
+    }
+    let picture = traced(&mut world, None);
+    let (frame, _) =
+        draw(&mut world, SIZE, SIZE, &FrameOptions { shading: Some(Shading::Phong), ..linear() });
+
+    // The decals that cover each pixel, as bits; 8 beside the wall.
+    let tracer =
+        Tracer::new(&mut world, &TraceOptions { size: (SIZE, SIZE), ..TraceOptions::default() }).unwrap();
+    let covers = |position: DVec3, decal: usize| {
+        let own = turns[decal].inverse() * position;
+        own.x.abs().max(own.y.abs()) < DECALS[decal]
+    };
+    let covering = |x: u32, y: u32| {
+        let hit = tracer.first_hit(DVec2::new(f64::from(x), f64::from(y)) + 0.5);
+        let bits = |position| (0..3).map(|decal| u32::from(covers(position, decal)) << decal).sum();
+        hit.map_or(8, |hit| bits(hit.position))
+    };
+    let mut found: [u32; 8] = [0; 8];
+    let mut largest: f64 = 0.0;
+    for (x, y) in (1..SIZE - 1).flat_map(|y| (1..SIZE - 1).map(move |x| (x, y))) {
+        let own = covering(x, y);
+        let inside =
+            [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)].iter().all(|at| covering(at.0, at.1) == own);
+        if own < 8 && inside {
+            let at = (y * SIZE + x) as usize;
+            let apart = (picture.radiance[at] - frame[at]).abs().max_element();
+            assert!(apart < STEP, "({x}, {y}), {own:03b}: {} and {}", picture.radiance[at], frame[at]);
+            largest = largest.max(apart);
+            found[own as usize] += 1;
+        }
+    }
+    println!("decals: {largest:.1e} at most; pixels by what covers them: {found:?}");
+    // The bare wall, each decal and their overlaps are in the picture.
+    assert!(found.iter().filter(|&&pixels| pixels > 50).count() >= 6, "{found:?}");
 }
 
 #[test]
