@@ -392,6 +392,9 @@ pub struct Trace {
     /// average.
     #[arg(long)]
     pub sample_by_noise: bool,
+    /// Seed of the random numbers: pictures with different seeds have independent noise.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
     /// Auxiliary pictures, as layers of an .exr, or as separate files beside a .png: albedo, normal, depth,
     /// rays, standard-error, direct, indirect, and light:NAME, direct:NAME, indirect:NAME for the light of one
     /// source; * as NAME for every source.

@@ -12,7 +12,6 @@ use lumbre::demo::has_light_to_bake;
 use lumbre::render::Display;
 use lumbre::trace::{
     Aov, Continuation, Ended, Integrator, Metering, Picture, TraceError, TraceOptions, TraceReport, Tracer,
-    draw_tree,
 };
 
 use crate::arguments::{Exposure, Frame, Trace};
@@ -104,6 +103,7 @@ fn options(asked: &Trace, frame: &lumbre::render::FrameOptions) -> TraceOptions 
         threads: asked.threads.map(usize::from),
         filter: asked.filter,
         adaptive: asked.adaptive,
+        seed: asked.seed,
         sample_by_noise: asked.sample_by_noise,
         aovs: asked.aov.clone(),
     }
@@ -179,7 +179,7 @@ fn print_tree(asked: &Trace, tracer: &Tracer, (x, y): (u32, u32)) -> anyhow::Res
         bail!("paths are no tree; leave out --integrator path, or --pixel");
     }
     let tree = tracer.tree(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
-    std::io::stdout().write_all(draw_tree(&tree, asked.tree).as_bytes())?;
+    std::io::stdout().write_all(tracer.draw_tree(&tree, asked.tree).as_bytes())?;
     Ok(())
 }
 

@@ -63,7 +63,7 @@ impl TriangleMesh {
     }
 
     /// Appends a mesh that has the same attributes as this one, or appends to an empty mesh.
-    pub(crate) fn append(&mut self, other: Self) {
+    pub fn append(&mut self, other: Self) {
         let first = self.positions.len() as u32;
         self.positions.extend(other.positions);
         self.normals.extend(other.normals);

@@ -27,6 +27,7 @@
 mod adjacency;
 pub mod atlas;
 mod bounding_rectangle;
+mod box_clip;
 mod chart;
 pub mod flat;
 mod grid;

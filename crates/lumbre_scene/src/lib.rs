@@ -48,6 +48,7 @@ mod image;
 mod lightmap_files;
 mod medium;
 mod quadric;
+mod quadric_mesh;
 mod reduced_lightmaps;
 mod settings;
 mod transform;
@@ -83,6 +84,7 @@ pub use lightmap_files::{
 pub use lumbre_optics::{Light, Material, Shading};
 pub use medium::Medium;
 pub use quadric::{Quadric, QuadricError, QuadricShape};
+pub use quadric_mesh::QuadricMesh;
 pub use reduced_lightmaps::reduce_lightmaps;
 pub use settings::SceneSettings;
 pub use transform::{GlobalTransform, Transform, propagate_transforms, update_transforms};

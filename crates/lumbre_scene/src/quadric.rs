@@ -1,5 +1,6 @@
 //! Exact surfaces for the ray tracer: planes, spheres, cylinders, cones and general quadrics that replace an
-//! entity's mesh. The rasterizer draws the mesh instead. Ray intersection is in the tracer.
+//! entity's mesh. The rasterizer draws the mesh instead, which is made in `quadric_mesh` where there is none. Ray
+//! intersection is in the tracer.
 
 use bevy_ecs::prelude::*;
 use glam::DVec3;
@@ -7,7 +8,11 @@ use thiserror::Error;
 
 /// The exact surface of an entity in its local space; the entity's transform applies, including scale and
 /// shear.
+///
+/// An entity without a [`Mesh`](crate::Mesh) gets a tessellation of the surface when this component is
+/// inserted, and a new one when it is inserted again; frames draw that.
 #[derive(Component, Clone, Debug, PartialEq)]
+#[component(on_insert = crate::quadric_mesh::insert_mesh)]
 pub struct Quadric {
     /// The shape.
     pub shape: QuadricShape,

@@ -68,15 +68,176 @@ fn exact_surfaces_need_a_mesh_of_one_primitive_and_a_size() {
     let bad = file("", r#""LUMBRE_quadric":{"kind":"sphere","radius":-1}"#);
     let error = load_slice(&mut World::new(), &bad, "bad.gltf", None).expect_err("it is refused");
     assert!(format!("{error:#}").contains("LUMBRE_quadric"), "{error:#}");
-    let without = String::from_utf8(file("", sphere)).expect("it is text").replace("\"mesh\":0,", "");
+    let two = String::from_utf8(file("", sphere)).expect("it is text");
+    let primitive = r#"{"attributes":{"POSITION":0},"material":0}"#;
+    let two = two.replace(primitive, &format!("{primitive},{primitive}"));
     let mut world = World::new();
-    let report = load_slice(&mut world, without.as_bytes(), "bare.gltf", None).expect("the file is sound");
+    let report = load_slice(&mut world, two.as_bytes(), "two.gltf", None).expect("the file is sound");
     assert!(
         report.notes.iter().any(|note| note.to_string().contains("LUMBRE_quadric")),
         "{:?}",
         report.notes
     );
     assert_eq!(world.query::<&Quadric>().iter(&world).count(), 0);
+}
+
+/// The name of a surface, the surface, a measure of the distance of a point from it, and its area.
+type KnownSurface = (&'static str, Quadric, fn(DVec3) -> f64, f64);
+
+/// All kinds of surfaces.
+fn surfaces() -> Vec<KnownSurface> {
+    use std::f64::consts::PI;
+    let general = |coefficients| Quadric::new(QuadricShape::General { coefficients });
+    let ellipsoid = general([-4.0, -1.0, -4.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0]);
+    let trim = |low: DVec3, high: DVec3| Some([low, high]);
+    let half_space = trim(DVec3::NEG_INFINITY.with_y(0.0), DVec3::INFINITY);
+    let slant = f64::hypot(1.0, 0.5);
+    vec![
+        ("sphere", Quadric::sphere(2.0), |p| p.length() - 2.0, 16.0 * PI),
+        (
+            "half a sphere",
+            Quadric { trim: half_space, ..Quadric::sphere(2.0) },
+            |p| p.length() - 2.0,
+            8.0 * PI,
+        ),
+        (
+            "cylinder",
+            Quadric::new(QuadricShape::Cylinder { radius: 0.5, height: 2.0, closed: false }),
+            |p| p.x.hypot(p.z) - 0.5,
+            2.0 * PI,
+        ),
+        (
+            "closed cylinder, cut",
+            Quadric {
+                trim: trim(DVec3::new(0.0, -0.25, -9.0), DVec3::splat(9.0)),
+                ..Quadric::new(QuadricShape::Cylinder { radius: 0.5, height: 2.0, closed: true })
+            },
+            |p| (p.x.hypot(p.z) - 0.5).max(p.y - 1.0),
+            PI * 0.5 * 1.25 + 0.5 * PI * 0.25,
+        ),
+        (
+            "cone",
+            Quadric::new(QuadricShape::Cone { radius: 0.5, height: 1.0, closed: true }),
+            |p| (p.x.hypot(p.z) - 0.5 * (0.5 - p.y)).max(-0.5 - p.y),
+            PI * 0.5 * slant + PI * 0.25,
+        ),
+        (
+            "plane",
+            Quadric {
+                trim: trim(DVec3::splat(-1.0), DVec3::new(3.0, 1.0, 1.0)),
+                ..Quadric::new(QuadricShape::Plane)
+            },
+            |p| p.y,
+            8.0,
+        ),
+        // 1 - 4 x² - (y - 1)² - 4 z²: an egg with its front inside, of a known area (a prolate spheroid).
+        ("egg", ellipsoid, |p| 4.0 * p.x * p.x + (p.y - 1.0).powi(2) + 4.0 * p.z * p.z - 1.0, {
+            let (a, c) = (0.5_f64, 1.0_f64);
+            let e = (1.0 - a * a / (c * c)).sqrt();
+            2.0 * PI * a * a * (1.0 + c / (a * e) * e.asin())
+        }),
+        // y = x² + z² up to 1.
+        (
+            "paraboloid",
+            Quadric {
+                trim: trim(DVec3::new(-1.5, -0.5, -1.5), DVec3::new(1.5, 1.0, 1.5)),
+                ..general([1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0])
+            },
+            |p| p.x * p.x + p.z * p.z - p.y,
+            PI / 6.0 * (5.0_f64.powf(1.5) - 1.0),
+        ),
+    ]
+}
+
+#[test]
+fn meshes_of_exact_surfaces_converge_with_the_square_of_their_step() {
+    for (name, quadric, apart, area) in surfaces() {
+        quadric.validate().expect("a surface");
+        let measured = [16, 32, 64].map(|segments| {
+            let mesh = quadric.mesh(segments);
+            mesh.validate().expect("a sound mesh");
+            let [low, high] = quadric.bounds();
+            let (mut sum, mut distances) = (0.0, 0.0);
+            for triangle in mesh.triangles() {
+                let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize].as_dvec3());
+                let normal =
+                    triangle.map(|vertex| mesh.normals[vertex as usize].as_dvec3()).iter().sum::<DVec3>();
+                let cross = (b - a).cross(c - a);
+                sum += 0.5 * cross.length();
+                assert!(cross.length() < 1e-7 || cross.dot(normal) > 0.0, "{name}: turned at {a}");
+                distances += 0.5 * cross.length() * apart((a + b + c) / 3.0).abs();
+            }
+            let inside = mesh.positions.iter().all(|at| {
+                let at = at.as_dvec3();
+                at.cmpge(low - 1e-6).all() && at.cmple(high + 1e-6).all()
+            });
+            assert!(inside, "{name} leaves its trim");
+            assert!(
+                mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-3),
+                "{name}: normals"
+            );
+            ((sum - area).abs() / area, distances / sum)
+        });
+        println!("{name}: relative error of the area, and mean distance from the surface, {measured:?}");
+        assert!(measured[0].0 < 0.06 && measured[2].0 < 0.004, "{name}: {measured:?}");
+        for (coarse, fine) in [(measured[0], measured[1]), (measured[1], measured[2])] {
+            // A quarter for half the step; not less than the rounding of f32.
+            assert!(fine.0 < (0.32 * coarse.0).max(1e-6), "{name}: area {measured:?}");
+            assert!(fine.1 < (0.32 * coarse.1).max(1e-6), "{name}: distance {measured:?}");
+        }
+    }
+    // What is cut away completely has no mesh.
+    let gone = Quadric { trim: Some([DVec3::splat(5.0), DVec3::splat(6.0)]), ..Quadric::sphere(2.0) };
+    assert!(gone.mesh(64).indices.is_empty());
+}
+
+#[test]
+fn exact_surfaces_without_a_mesh_get_one() {
+    // In a file: the material is the extension's.
+    let sphere = r#""LUMBRE_quadric":{"kind":"sphere","radius":0.5,"material":0}"#;
+    let own = r#""LUMBRE_materials_phong":{"diffuse":[0.5,0.25,0.125]}"#;
+    let bare = String::from_utf8(file(own, sphere)).expect("it is text").replace("\"mesh\":0,", "");
+    let mut world = World::new();
+    let report = load_slice(&mut world, bare.as_bytes(), "bare.gltf", None).expect("the file is sound");
+    assert!(report.notes.is_empty(), "{:?}", report.notes);
+    let mut found = world.query::<(&Quadric, &Mesh, &Material)>();
+    let (quadric, mesh, material) = found.single(&world).expect("one surface");
+    assert_eq!((quadric, material.front.diffuse), (&Quadric::sphere(0.5), Vec3::new(0.5, 0.25, 0.125)));
+    let expected = quadric.mesh(Quadric::SEGMENTS);
+    assert_eq!((&mesh.0.positions, &mesh.0.indices), (&expected.positions, &expected.indices));
+    // It comes back from a saved file with its mesh, for programs that know no exact surfaces.
+    let folder = tempfile::tempdir().expect("there is a folder for temporary files");
+    let path = folder.path().join("bare.glb");
+    let count = mesh.0.triangle_count();
+    save(&mut world, &path).expect("it can be saved");
+    let mut again = World::new();
+    lumbre_scene::load(&mut again, &path).expect("it can be loaded");
+    let mut found = again.query::<(&Quadric, &Mesh)>();
+    let (quadric, mesh) = found.single(&again).expect("one surface");
+    assert_eq!((quadric, mesh.0.triangle_count()), (&Quadric::sphere(0.5), count));
+    // A surface without an end is noted, and one that is cut away is left out.
+    for (json, word) in [
+        (r#""LUMBRE_quadric":{"kind":"plane"}"#, "no end"),
+        (r#""LUMBRE_quadric":{"kind":"sphere","min":[5,5,5],"max":[6,6,6]}"#, "nothing"),
+    ] {
+        let bare = String::from_utf8(file("", json)).expect("it is text").replace("\"mesh\":0,", "");
+        let report =
+            load_slice(&mut World::new(), bare.as_bytes(), "bare.gltf", None).expect("the file is sound");
+        assert!(report.notes.iter().any(|note| note.to_string().contains(word)), "{:?}", report.notes);
+    }
+    // In a World: on insertion, and again for another surface; a mesh of its own is kept.
+    let mut world = World::new();
+    let entity = world.spawn((Quadric::sphere(1.0), Material::default())).id();
+    world.flush();
+    let radius = |world: &World| world.get::<Mesh>(entity).map(|mesh| mesh.0.positions[0].length());
+    assert_eq!(radius(&world), Some(1.0));
+    world.entity_mut(entity).insert(Quadric::sphere(3.0));
+    world.flush();
+    assert_eq!(radius(&world), Some(3.0));
+    let own = Arc::new(shapes::cuboid(Vec3::ONE, 1));
+    let kept = world.spawn((Quadric::sphere(1.0), Mesh(own.clone()))).id();
+    world.flush();
+    assert!(world.get::<Mesh>(kept).is_some_and(|mesh| Arc::ptr_eq(&mesh.0, &own)));
 }
 
 #[test]

@@ -1,11 +1,13 @@
-//! Output of a recorded ray tree: as indented text, as JSON, as a Graphviz graph, and as an SVG drawing of
-//! the rays, with the names of what they meet, from above and from the side. The tree itself is in `branch`.
+//! Output of a recorded ray tree: as indented text, as JSON and as a Graphviz graph. The drawing of the rays in
+//! the scene is in `branch_svg`, the tree itself in `branch`.
 
 use std::fmt::Write;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use crate::branch::{Branch, Kind};
+use crate::branch_svg::svg;
+use crate::scene::Scene;
 
 /// An output format of a ray tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +18,7 @@ pub enum TreeFormat {
     Json,
     /// A graph in Graphviz's language.
     Dot,
-    /// An SVG drawing of the rays in space, from above and from the side.
+    /// An SVG drawing of the rays and the outlines of the objects around them, from above and from the side.
     Svg,
 }
 
@@ -41,7 +43,7 @@ impl TreeFormat {
 }
 
 /// Returns the tree in a format, with a newline at its end.
-pub fn draw_tree(tree: &Branch, format: TreeFormat) -> String {
+pub(crate) fn draw_tree(scene: &Scene, tree: &Branch, format: TreeFormat) -> String {
     let mut out = String::new();
     let written = match format {
         TreeFormat::Text => text(&mut out, tree, 0),
@@ -51,7 +53,7 @@ pub fn draw_tree(tree: &Branch, format: TreeFormat) -> String {
             Ok(())
         }
         TreeFormat::Dot => dot(&mut out, tree),
-        TreeFormat::Svg => svg(&mut out, tree),
+        TreeFormat::Svg => svg(&mut out, scene, tree),
     };
     // Writing to a String cannot fail.
     debug_assert!(written.is_ok());
@@ -184,89 +186,4 @@ fn dot_branch(out: &mut String, branch: &Branch, parent: &str, count: &mut usize
 
 fn escaped(name: &str) -> String {
     name.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', " ")
-}
-
-fn escaped_markup(name: &str) -> String {
-    let printable: String = name.chars().filter(|c| !c.is_control()).collect();
-    printable.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
-/// Width and height of a view in pixels.
-const SIDE: f64 = 480.0;
-/// Margin around a view in pixels.
-const MARGIN: f64 = 24.0;
-/// Drawn length of a ray that hits nothing, as a fraction of the drawing.
-const OPEN_RAY: f64 = 0.15;
-
-fn svg(out: &mut String, tree: &Branch) -> std::fmt::Result {
-    let mut points = Vec::new();
-    ends(tree, &mut points);
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for point in &points {
-        (low, high) = (low.min(*point), high.max(*point));
-    }
-    let size = (high - low).max_element().max(1e-9);
-    let (width, height) = (2.0 * (SIDE + 2.0 * MARGIN), SIDE + 2.0 * MARGIN);
-    writeln!(
-        out,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
-    )?;
-    let middle = 0.5 * (low + high);
-    for (view, name, left) in [
-        (0, "from above (x to the right, z down)", 0.0),
-        (1, "from the side (z to the left, y up)", width / 2.0),
-    ] {
-        let project = |point: DVec3| {
-            let off = (point - middle) / size * SIDE;
-            let flat = if view == 0 { DVec2::new(off.x, off.z) } else { DVec2::new(-off.z, -off.y) };
-            flat + DVec2::new(left + MARGIN + 0.5 * SIDE, MARGIN + 0.5 * SIDE)
-        };
-        writeln!(out, "<text x=\"{}\" y=\"16\">{name}</text>", left + MARGIN)?;
-        svg_branch(out, tree, OPEN_RAY * size, &project)?;
-    }
-    writeln!(out, "</svg>")
-}
-
-fn ends(branch: &Branch, points: &mut Vec<DVec3>) {
-    points.push(branch.origin);
-    points.extend(branch.point.as_ref().map(|point| point.position));
-    branch.branches.iter().for_each(|next| ends(next, points));
-}
-
-fn svg_branch(
-    out: &mut String,
-    branch: &Branch,
-    open: f64,
-    project: &impl Fn(DVec3) -> DVec2,
-) -> std::fmt::Result {
-    let end = match &branch.point {
-        Some(point) => point.position,
-        None => branch.origin + branch.direction * open,
-    };
-    let (from, to) = (project(branch.origin), project(end));
-    let stroke = match branch.kind {
-        Kind::Camera => "#202020",
-        Kind::Mirrored => "#c03020",
-        Kind::Transmitted => "#2060c0",
-        Kind::Behind => "#808080",
-    };
-    let dashes = if branch.cut { " stroke-dasharray=\"3 3\"" } else { "" };
-    let width = 0.5 + 2.0 * branch.weight.max_element().clamp(0.0, 1.0).sqrt();
-    writeln!(
-        out,
-        "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{stroke}\" stroke-width=\"{width:.2}\"{dashes}/>",
-        from.x, from.y, to.x, to.y
-    )?;
-    if let Some(point) = &branch.point {
-        let name = escaped_markup(&point.object);
-        writeln!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.5\" fill=\"{stroke}\"/>", to.x, to.y)?;
-        writeln!(
-            out,
-            "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{stroke}\">{name}</text>",
-            to.x + 5.0,
-            to.y - 4.0
-        )?;
-    }
-    branch.branches.iter().try_for_each(|next| svg_branch(out, next, open, project))
 }

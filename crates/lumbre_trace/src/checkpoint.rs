@@ -105,7 +105,7 @@ impl<'a> Keeper<'a> {
 const MAGIC: &[u8; 8] = b"LUMBRETR";
 /// Version of the format and of the samples themselves: it is raised when the same options give other
 /// samples.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const HEADER: usize = 8 + 4 + 96 + 32;
 /// Bytes per pixel.
 const PIXEL: usize = 10 * 8 + 3 * 4;

@@ -1,6 +1,11 @@
-//! Coplanar surfaces, where rounding would decide which one a ray hits. An opaque one takes precedence, so
-//! that no light leaks past a floor that glass stands on; solids of glass that touch are crossed together, as
-//! one interface. The rays that go on are computed in `interface`.
+//! Coplanar surfaces, where rounding would decide which one a ray hits, and which others it misses.
+//!
+//! - An opaque surface takes precedence over glass, so that no light leaks past a floor that glass stands on.
+//! - Surfaces that cover their background in part (alpha blending), such as decals and labels, lie over what is
+//!   opaque or glass in their plane, as in frames, and over each other in the order of the objects, the
+//!   youngest on top.
+//! - Solids of glass that touch are crossed together, as one interface. The rays that go on are computed in
+//!   `interface`.
 
 use glam::DVec3;
 
@@ -12,33 +17,90 @@ use crate::surface_point::SurfacePoint;
 /// the offset of ray origins.
 const TOGETHER: f64 = 64.0 / (1 << 24) as f64;
 /// Largest number of surfaces in one place.
-const MAX_TOGETHER: usize = 8;
+const MAX_TOGETHER: usize = 32;
 /// Least cosine between the normals of coplanar surfaces.
 const PARALLEL: f64 = 0.999_999;
 
-/// Returns the nearest surface that `accept` takes, or an opaque one that is coplanar with it, and the point
-/// where the ray hits it.
-pub(crate) fn nearest_surface(
+/// A surface that a ray hits.
+#[derive(Clone, Debug)]
+pub(crate) struct Layer {
+    pub hit: Hit,
+    pub point: SurfacePoint,
+}
+
+/// The surfaces that a ray hits in one place.
+#[derive(Clone, Debug)]
+pub(crate) struct Layers {
+    pub top: Layer,
+    /// The surfaces in the same plane that `top` covers in part, in the order in which a ray meets them, each at
+    /// a distance of 0 from the first.
+    pub below: Vec<Layer>,
+}
+
+/// Returns the nearest surface that `accept` takes, with all that are coplanar with it and partly visible
+/// there.
+pub(crate) fn nearest_layers(
     scene: &Scene,
     ray: &SpaceRay,
     farthest: f64,
     accept: impl Fn(&Candidate) -> bool,
-) -> Option<(Hit, SurfacePoint)> {
-    let found = scene.geometry.closest(ray, farthest, &accept)?;
-    let point = SurfacePoint::new(scene, ray, &found);
-    if !scene.is_open(found.candidate.object, true) {
-        return Some((found, point));
+) -> Option<Layers> {
+    let hit = scene.geometry.closest(ray, farthest, &accept)?;
+    let point = SurfacePoint::new(scene, ray, &hit);
+    let found = Layer { hit, point };
+    let open = scene.is_open(found.point.object, true);
+    if !open && !scene.may_be_covered(found.point.position) {
+        return Some(Layers { top: found, below: Vec::new() });
     }
-    let place = Place::of(ray, &point);
-    let opaque = scene.geometry.closest(&place.around, 2.0 * place.reach, |candidate| {
-        scene.passage(candidate.object) == Passage::Closed && accept(candidate)
-    });
-    let Some(opaque) = opaque.filter(|opaque| place.holds(scene, opaque)) else {
-        return Some((found, point));
+    let place = Place::of(ray, &found.point);
+    let nearest = |wanted: &dyn Fn(Passage) -> bool| {
+        let hit = scene.geometry.closest(&place.around, 2.0 * place.reach, |candidate| {
+            wanted(scene.passage(candidate.object)) && accept(candidate)
+        });
+        hit.filter(|hit| place.holds(scene, hit)).map(|hit| place.layer(scene, ray, hit))
     };
-    let distance = (point.distance - place.reach + opaque.distance).max(0.0);
-    let hit = Hit { distance, ..opaque };
-    Some((hit, SurfacePoint::new(scene, ray, &hit)))
+    let opaque = |passage| matches!(passage, Passage::Closed | Passage::Cut);
+    let base = match scene.passage(found.point.object) {
+        Passage::Closed | Passage::Cut => Some(found.clone()),
+        Passage::Clear => Some(nearest(&opaque).unwrap_or_else(|| found.clone())),
+        Passage::Covering => nearest(&opaque).or_else(|| nearest(&|passage| passage == Passage::Clear)),
+    };
+    // What is on the other side of a base is not over it.
+    let covers = |candidate: &Candidate| accept(candidate) && (base.is_none() || scene.is_seen(candidate));
+    let mut layers: Vec<Layer> =
+        place.coverings(scene, covers).into_iter().map(|hit| place.layer(scene, ray, hit)).collect();
+    layers.extend(base);
+    let extent = layers.iter().fold(0.0_f64, |extent, layer| extent.max(layer.point.extent));
+    for layer in &mut layers {
+        // Rays that leave one of them are past all of them.
+        layer.point.extent = extent;
+    }
+    for layer in layers.iter_mut().skip(1) {
+        layer.point.distance = 0.0;
+    }
+    let mut layers = layers.into_iter();
+    // Where rounding hides the surface itself from the ray around it, it is alone.
+    let top = layers.next().unwrap_or(found);
+    Some(Layers { top, below: layers.collect() })
+}
+
+/// Returns the part of the light of a surface that reaches a viewer past the surfaces that cover it in its own
+/// plane: the product of 1 - alpha. `ray` goes to the surface, whose point lies at a distance; `normal` is a unit
+/// vector to either side of it, and `extent` is its largest coordinate.
+pub(crate) fn uncovered_share(
+    scene: &Scene,
+    ray: &SpaceRay,
+    distance: f64,
+    (normal, extent): (DVec3, f64),
+) -> f64 {
+    let position = ray.at(distance);
+    if !scene.may_be_covered(position) {
+        return 1.0;
+    }
+    let towards = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
+    let place = Place::new(position, ray.direction, towards, extent);
+    let coverings = place.coverings(scene, |candidate| scene.is_seen(candidate));
+    coverings.iter().map(|hit| 1.0 - SurfacePoint::new(scene, &place.around, hit).coverage).product()
 }
 
 /// Returns the other solids that have a coplanar surface at a point of a solid: glass that touches glass is
@@ -71,17 +133,52 @@ struct Place {
     around: SpaceRay,
     /// Metres from its start to the surface.
     reach: f64,
+    /// Metres from the origin of the original ray to the surface.
+    distance: f64,
     /// Unit geometric normal of the surface, towards the ray's origin.
     normal: DVec3,
 }
 
 impl Place {
     fn of(ray: &SpaceRay, point: &SurfacePoint) -> Self {
-        let size = point.extent.max(point.position.abs().max_element());
-        let cosine = ray.direction.dot(point.geometric).abs().max(1e-3);
+        let place = Self::new(point.position, ray.direction, point.geometric, point.extent);
+        Self { distance: point.distance, ..place }
+    }
+
+    fn new(position: DVec3, direction: DVec3, normal: DVec3, extent: f64) -> Self {
+        let size = extent.max(position.abs().max_element());
+        let cosine = direction.dot(normal).abs().max(1e-3);
         let reach = TOGETHER * size / cosine;
-        let around = SpaceRay::new(point.position - ray.direction * reach, ray.direction);
-        Self { around, reach, normal: point.geometric }
+        let around = SpaceRay::new(position - direction * reach, direction);
+        Self { around, reach, distance: reach, normal }
+    }
+
+    /// Returns the hits of the surfaces that `accept` takes and that cover the place in part, the youngest object
+    /// first.
+    fn coverings(&self, scene: &Scene, accept: impl Fn(&Candidate) -> bool) -> Vec<Hit> {
+        let mut met: Vec<usize> = Vec::new();
+        let mut covering = Vec::new();
+        while met.len() < MAX_TOGETHER {
+            let next = scene.geometry.closest(&self.around, 2.0 * self.reach, |candidate| {
+                scene.passage(candidate.object) == Passage::Covering
+                    && !met.contains(&candidate.object)
+                    && accept(candidate)
+            });
+            let Some(hit) = next else { break };
+            met.push(hit.candidate.object);
+            if self.holds(scene, &hit) {
+                covering.push(hit);
+            }
+        }
+        covering.sort_by_key(|hit| std::cmp::Reverse(hit.candidate.object));
+        covering
+    }
+
+    /// Returns the surface that the ray around the place hits, as the original ray sees it.
+    fn layer(&self, scene: &Scene, ray: &SpaceRay, hit: Hit) -> Layer {
+        let distance = (self.distance - self.reach + hit.distance).max(0.0);
+        let hit = Hit { distance, ..hit };
+        Layer { hit, point: SurfacePoint::new(scene, ray, &hit) }
     }
 
     /// Returns true if the surfaces are parallel. Where the edge of one only touches the other, rays hit them

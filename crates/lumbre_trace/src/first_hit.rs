@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::coplanar::nearest_surface;
+use crate::coplanar::nearest_layers;
 use crate::geometry::Candidate;
 use crate::surface_point::SurfacePoint;
 use crate::tiles::for_every_pixel;
@@ -92,5 +92,5 @@ impl FirstHits {
 fn first_point(view: &View, place: DVec2) -> Option<SurfacePoint> {
     let (camera, scene) = (view.camera.through(place), &view.scene);
     let seen = |candidate: &Candidate| scene.is_seen(candidate);
-    nearest_surface(scene, &camera.ray, camera.farthest, seen).map(|(_, point)| point)
+    nearest_layers(scene, &camera.ray, camera.farthest, seen).map(|layers| layers.top.point)
 }

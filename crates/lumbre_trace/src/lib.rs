@@ -44,6 +44,7 @@
 mod aov;
 mod branch;
 mod branch_drawing;
+mod branch_svg;
 mod camera_ray;
 mod checkpoint;
 mod comparison;
@@ -76,6 +77,7 @@ mod ray_tree;
 mod rendering;
 mod sample_distribution;
 mod scene;
+mod scene_outline;
 mod shadow_ray;
 mod surface_point;
 mod tiles;
@@ -84,7 +86,7 @@ mod view;
 
 pub use aov::{Aov, AovPicture, AovValues, LightPart};
 pub use branch::{Branch, BranchLamp, BranchLight, BranchPoint, Kind};
-pub use branch_drawing::{TreeFormat, draw_tree};
+pub use branch_drawing::TreeFormat;
 pub use checkpoint::{Continuation, Keep};
 pub use comparison::{Comparison, compare, relative_error};
 pub use display::shown;

@@ -67,6 +67,8 @@ pub(crate) struct EmitterSample {
     pub distance: f64,
     /// Probability density per steradian.
     pub density: f64,
+    /// Unit normal of the emissive triangle and its largest coordinate, to which rounding errors are relative.
+    pub surface: (DVec3, f64),
 }
 
 /// Marks triangles that emit nothing.
@@ -202,12 +204,14 @@ impl LightSampler {
         let object = &scene.objects[emitter.object];
         let radiance = emitted(object, emitter.number, weights, cosine > 0.0);
         let density = chance / emitter.area * distance * distance / cosine.abs();
+        let extent = emitter.corners.iter().fold(0.0_f64, |extent, at| extent.max(at.abs().max_element()));
         (radiance != DVec3::ZERO && density.is_finite() && density > 0.0).then_some(EmitterSample {
             object: emitter.object,
             radiance,
             direction,
             distance,
             density,
+            surface: (emitter.normal, extent),
         })
     }
 

@@ -85,6 +85,9 @@ pub struct TraceOptions {
     /// For paths: distributes samples in proportion to each pixel's noise, with [`samples`](Self::samples) of
     /// them per pixel on average.
     pub sample_by_noise: bool,
+    /// Number that the random numbers of all samples depend on: pictures with different seeds have independent
+    /// noise.
+    pub seed: u32,
     /// Auxiliary pictures to produce beside the main one.
     pub aovs: Vec<Aov>,
 }
@@ -108,6 +111,7 @@ impl Default for TraceOptions {
             filter: Filter::Box,
             adaptive: None,
             sample_by_noise: false,
+            seed: 0,
             aovs: Vec::new(),
         }
     }

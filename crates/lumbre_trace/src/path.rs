@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 use lumbre_optics::{apply_fog, fog_weight};
 
 use crate::camera_ray::{CameraRay, CameraRays};
-use crate::coplanar::nearest_surface;
+use crate::coplanar::{Layer, nearest_layers, uncovered_share};
 use crate::direct_light::shadow_ray;
 use crate::film::Sample;
 use crate::geometry::{Place, SpaceRay};
@@ -46,6 +46,9 @@ const MAX_SURFACES: u32 = 100_000;
 struct Walk {
     ray: SpaceRay,
     farthest: f64,
+    /// The surfaces where the ray starts, below a partly covering one in the same plane, the lowest first: it
+    /// hits the last of them.
+    below: Vec<Layer>,
     media: MediumStack,
     throughput: DVec3,
     /// The product of η² over the interfaces that the path was refracted at, by which refraction has lessened
@@ -110,6 +113,7 @@ impl<'a> Paths<'a> {
         let mut walk = Walk {
             ray: camera.ray,
             farthest: camera.farthest,
+            below: Vec::new(),
             media,
             throughput: DVec3::ONE,
             eta_scale: 1.0,
@@ -137,15 +141,9 @@ impl<'a> Paths<'a> {
 
     fn step(&self, walk: &mut Walk, numbers: &mut Numbers) -> Next {
         let scene = self.scene;
-        walk.rays += 1;
         // Whether the ray comes from the eye, a mirror or glass.
         let is_specular = walk.last.is_none();
-        // Such rays pass the culled backs of single-sided surfaces, as a rasterizer does. Rays that carry light
-        // are blocked by them.
-        let found = nearest_surface(scene, &walk.ray, walk.farthest, |candidate| {
-            if is_specular { scene.is_seen(candidate) } else { scene.blocks(candidate) }
-        });
-        let Some((hit, point)) = found else {
+        let Some(Layer { hit, point }) = walk.next_surface(scene, is_specular) else {
             walk.escapes(scene);
             return Next::Ends;
         };
@@ -289,7 +287,11 @@ impl<'a> Paths<'a> {
             // A path that ends here cannot hit the emitter itself.
             let found = if last { 0.0 } else { self.chance(walk, point, lobes, sample.direction) };
             let reflected = lobes.reflectance(sample.direction) * sample.radiance / (sample.density + found);
-            let seen = self.seen(walk, point, (sample.direction, sample.distance, &[]), reflected);
+            let mut seen = self.seen(walk, point, (sample.direction, sample.distance, &[]), reflected);
+            if self.shadows && seen != DVec3::ZERO {
+                let ray = shadow_ray(point, sample.direction);
+                seen *= uncovered_share(self.scene, &ray, sample.distance, sample.surface);
+            }
             walk.brings(Source::Object(sample.object), walk.reflections + 1, seen);
         }
     }
@@ -329,6 +331,22 @@ impl<'a> Paths<'a> {
 }
 
 impl Walk {
+    /// Returns the surface that the ray hits next.
+    fn next_surface(&mut self, scene: &Scene, is_specular: bool) -> Option<Layer> {
+        if let Some(below) = self.below.pop() {
+            return Some(below);
+        }
+        self.rays += 1;
+        // Rays from the eye, a mirror or glass pass the culled backs of single-sided surfaces, as a rasterizer
+        // does. Rays that carry light are blocked by them.
+        let layers = nearest_layers(scene, &self.ray, self.farthest, |candidate| {
+            if is_specular { scene.is_seen(candidate) } else { scene.blocks(candidate) }
+        })?;
+        self.below = layers.below;
+        self.below.reverse();
+        Some(layers.top)
+    }
+
     /// Adds light that arrives at the path's last point, times the throughput. `turns` counts the surfaces on
     /// its whole way to the eye.
     fn brings(&mut self, source: Source, turns: u32, light: DVec3) {
@@ -360,6 +378,7 @@ impl Walk {
     fn turns(&mut self, ray: SpaceRay, scattering: Option<Scattering>, numbers: &mut Numbers) -> Next {
         self.ray = ray;
         self.farthest = f64::INFINITY;
+        self.below.clear();
         self.last = scattering;
         self.reflections += 1;
         let scattered = self.last.is_some() || matches!(self.fog, FogBegins::Nowhere);
@@ -395,6 +414,7 @@ mod tests {
                 let mut walk = Walk {
                     ray,
                     farthest: f64::INFINITY,
+                    below: Vec::new(),
                     media: MediumStack::default(),
                     throughput: DVec3::splat(throughput),
                     eta_scale,

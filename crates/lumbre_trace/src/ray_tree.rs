@@ -7,9 +7,9 @@ use lumbre_optics::{apply_fog, fog_weight};
 
 use crate::branch::{Branch, Kind};
 use crate::camera_ray::CameraRays;
-use crate::coplanar::nearest_surface;
+use crate::coplanar::{Layer, nearest_layers};
 use crate::direct_light::{DirectLight, Lighting, direct_light};
-use crate::geometry::SpaceRay;
+use crate::geometry::{Candidate, SpaceRay};
 use crate::interface::RaySplit;
 use crate::light_terms::{BOUNCED, LightTerms, Source};
 use crate::medium::MediumStack;
@@ -83,6 +83,8 @@ struct Twig<'m> {
     /// Metres from the last surface that reflected or refracted it to its start, which is behind a partly
     /// covering surface if they are not 0.
     passed: f64,
+    /// The surfaces where it starts, below a partly covering one in the same plane: it hits the first of them.
+    below: &'m [Layer],
 }
 
 impl RayTree<'_> {
@@ -97,8 +99,17 @@ impl RayTree<'_> {
     ) -> Seen {
         let mut seen = Seen { terms, ..Seen::default() };
         let mut left = self.limits.rays;
-        let root =
-            Twig { ray, farthest, media, weight: DVec3::ONE, depth: 0, turns: 0, first: true, passed: 0.0 };
+        let root = Twig {
+            ray,
+            farthest,
+            media,
+            weight: DVec3::ONE,
+            depth: 0,
+            turns: 0,
+            first: true,
+            passed: 0.0,
+            below: &[],
+        };
         seen.radiance = self.radiance(root, &mut left, &mut seen, record);
         seen
     }
@@ -110,12 +121,19 @@ impl RayTree<'_> {
         seen: &mut Seen,
         mut record: Option<&mut Branch>,
     ) -> DVec3 {
-        seen.rays += 1;
         *left = left.saturating_sub(1);
         let own_terms = seen.terms.len();
         let scene = self.scene;
-        let found = nearest_surface(scene, &twig.ray, twig.farthest, |candidate| scene.is_seen(candidate));
-        let Some((_, point)) = found else {
+        let layers;
+        let (found, below) = if let [next, below @ ..] = twig.below {
+            (Some(&next.point), below)
+        } else {
+            seen.rays += 1;
+            let seen_by_eyes = |candidate: &Candidate| scene.is_seen(candidate);
+            layers = nearest_layers(scene, &twig.ray, twig.farthest, seen_by_eyes);
+            layers.as_ref().map_or((None, &[][..]), |layers| (Some(&layers.top.point), &layers.below))
+        };
+        let Some(point) = found else {
             // An absorbing medium without an end leaves nothing in the channels that it absorbs.
             let background = scene.settings.shown_background().as_dvec3();
             let radiance = match twig.media.transmittance(f64::INFINITY) {
@@ -133,7 +151,7 @@ impl RayTree<'_> {
         let object = &scene.objects[point.object];
         let clear = twig.media.transmittance(point.distance);
         if let Some(branch) = record.as_deref_mut() {
-            branch.meets(scene, &point, twig.media, clear);
+            branch.meets(scene, point, twig.media, clear);
         }
 
         let mut radiance = if object.material.unlit {
@@ -141,7 +159,7 @@ impl RayTree<'_> {
             seen.terms.add(Source::Object(point.object), twig.turns, point.surface.diffuse);
             point.surface.diffuse
         } else {
-            self.lit(&twig, &point, clear, left, seen, record.as_deref_mut())
+            self.lit(&twig, point, clear, left, seen, record.as_deref_mut())
         };
         if let Some(fog) = &scene.settings.fog {
             let distance =
@@ -162,6 +180,7 @@ impl RayTree<'_> {
                 media: twig.media,
                 weight: twig.weight * behind * clear,
                 passed: twig.passed + point.distance,
+                below,
                 ..twig
             };
             radiance = radiance * point.coverage
@@ -218,6 +237,7 @@ impl RayTree<'_> {
                 turns: twig.turns + 1,
                 first: false,
                 passed: 0.0,
+                below: &[],
             };
             radiance +=
                 self.branch_off(Kind::Mirrored, next, split.mirrored, left, seen, record.as_deref_mut());
@@ -232,6 +252,7 @@ impl RayTree<'_> {
                 turns: twig.turns + u32::from(!object.medium.thin),
                 first: false,
                 passed: 0.0,
+                below: &[],
             };
             radiance += self.branch_off(Kind::Transmitted, next, split.transmitted, left, seen, record);
         }

@@ -6,6 +6,7 @@ use std::cell::Cell;
 
 use glam::DVec3;
 
+use crate::coplanar::{Layer, Layers, nearest_layers};
 use crate::geometry::SpaceRay;
 use crate::interface::reflected_by_sheet;
 use crate::medium::MediumStack;
@@ -61,32 +62,36 @@ pub(crate) fn transmittance(
     let (mut ray, mut travelled, mut media) = (*ray, 0.0, media.clone());
     for _ in 0..MAX_SURFACES {
         rays += 1;
-        let next = scene.geometry.closest(&ray, distance - travelled, |candidate| {
+        let next = nearest_layers(scene, &ray, distance - travelled, |candidate| {
             open(candidate.object) && !bulbs.contains(&candidate.object)
         });
-        let Some(hit) = next else {
+        let Some(Layers { top, below }) = next else {
             return (left * media.transmittance(distance - travelled), rays);
         };
-        let point = SurfacePoint::new(scene, &ray, &hit);
-        let object = &scene.objects[point.object];
-        let front = hit.candidate.front;
-        let solid = scene.is_solid(point.object);
-        let here = if solid { media.before(point.object, object, front) } else { media.clone() };
-        left *= here.transmittance(point.distance);
-        media = if solid { here.across(point.object, object, front) } else { here };
-        left *= match object.passage() {
-            Passage::Clear if glass == Glass::OnlySheets => {
-                let cosine = point.optical_normal(-ray.direction).dot(-ray.direction);
-                object.transmission() * (1.0 - reflected_by_sheet(object, cosine))
-            }
-            Passage::Clear => object.transmission().min(DVec3::ONE),
-            _ => DVec3::splat(1.0 - point.coverage),
-        };
+        travelled += top.point.distance;
+        let leaving =
+            |at: &SurfacePoint| SpaceRay::leaving(at.position, ray.direction, at.geometric, at.extent);
+        let after = leaving(&top.point);
+        for Layer { hit, point } in [top].into_iter().chain(below) {
+            let object = &scene.objects[point.object];
+            let front = hit.candidate.front;
+            let solid = scene.is_solid(point.object);
+            let here = if solid { media.before(point.object, object, front) } else { media.clone() };
+            left *= here.transmittance(point.distance);
+            media = if solid { here.across(point.object, object, front) } else { here };
+            left *= match object.passage() {
+                Passage::Clear if glass == Glass::OnlySheets => {
+                    let cosine = point.optical_normal(-ray.direction).dot(-ray.direction);
+                    object.transmission() * (1.0 - reflected_by_sheet(object, cosine))
+                }
+                Passage::Clear => object.transmission().min(DVec3::ONE),
+                _ => DVec3::splat(1.0 - point.coverage),
+            };
+        }
         if left.max_element() <= 0.0 {
             return (DVec3::ZERO, rays);
         }
-        travelled += point.distance;
-        ray = SpaceRay::leaving(point.position, ray.direction, point.geometric, point.extent);
+        ray = after;
     }
     (DVec3::ZERO, rays)
 }

@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3};
 use crate::TraceError;
 use crate::aov::{Aov, AovPicture, AovValues};
 use crate::branch::{Branch, Kind};
+use crate::branch_drawing::{TreeFormat, draw_tree};
 use crate::checkpoint::{Continuation, Keeper};
 use crate::direct_light::Lighting;
 use crate::film::Film;
@@ -110,6 +111,11 @@ impl Tracer {
             }
         });
         root
+    }
+
+    /// Returns a tree of this tracer in a format, with a newline at its end.
+    pub fn draw_tree(&self, tree: &Branch, format: TreeFormat) -> String {
+        draw_tree(&self.view.scene, tree, format)
     }
 
     /// Returns the surface that is visible through a point of the picture, in pixels from its upper left

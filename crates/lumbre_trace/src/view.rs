@@ -68,7 +68,7 @@ impl View {
     /// corner, and the sign of its weight.
     pub fn sample_place(&self, (x, y): (usize, usize), pass: u32, index: u32) -> (Numbers, DVec2, f64) {
         let pixel = (y as u32).wrapping_mul(65_537).wrapping_add(x as u32);
-        let mut numbers = Numbers::new(pixel, pass, index);
+        let mut numbers = Numbers::new(pixel ^ self.options.seed.wrapping_mul(SEED_STEP), pass, index);
         // A single ray of the ray tree goes through the pixel's centre, as in a frame.
         let alone = self.options.integrator == Integrator::Whitted && self.options.samples.unwrap_or(1) == 1;
         let (offset, sign) = if alone { (DVec2::ZERO, 1.0) } else { self.filter.place(numbers.pair()) };
@@ -90,6 +90,9 @@ impl View {
         }
     }
 }
+
+/// An odd number with which different seeds give a pixel different random numbers.
+const SEED_STEP: u32 = 0x85eb_ca6b;
 
 /// Returns the centre of a pixel, in pixels from the upper left corner.
 pub(crate) fn pixel_middle(x: usize, y: usize) -> DVec2 {

@@ -363,3 +363,89 @@ fn samples_by_noise_are_true_and_so_is_their_stated_error() {
     println!("bias {:+.2e}, standard error of it {of_mean:.1e}", bias(&by_noise));
     assert!(bias(&by_noise).abs() < 5.0 * of_mean);
 }
+
+/// Returns the root mean square difference of two pictures.
+fn rms(a: &Picture, b: &Picture) -> f64 {
+    let squares = a.radiance.iter().zip(&b.radiance).map(|(a, b)| (*a - *b).length_squared());
+    (squares.sum::<f64>() / (3.0 * a.radiance.len() as f64)).sqrt()
+}
+
+#[test]
+fn adaptive_samples_have_a_smaller_error_at_edges_for_the_same_rays() {
+    // Glowing boxes, turned so that no edge follows the pixels, before a dark background: all error is at edges.
+    let scene = || {
+        let mut world = World::new();
+        for number in 0..4 {
+            let turned = glam::DQuat::from_rotation_z(0.3 + 0.4 * f64::from(number));
+            let place = Transform::from_xyz(f64::from(number) - 1.5, 0.1, 0.0).with_rotation(turned);
+            let mesh = Mesh(Arc::new(shapes::cuboid(Vec3::splat(0.5), 1)));
+            world.spawn((mesh, glowing(0.2 + 0.2 * number as f32, 0.0), place));
+        }
+        camera(&mut world, DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 0.7);
+        world
+    };
+    let evenly = |samples: u32| TraceOptions { samples: Some(samples), ..options(64) };
+    let (reference, _) = draw(&mut scene(), &TraceOptions { seed: 99, ..evenly(4096) });
+    let (mut adaptive_error, mut even_error) = (0.0, 0.0);
+    for seed in 0..4 {
+        let asked = TraceOptions { adaptive: Some(0.02), seed, ..evenly(64) };
+        let (adaptive, report) = draw(&mut scene(), &asked);
+        let per_pixel = (report.rays as f64 / (64.0 * 64.0)).ceil();
+        assert!(report.samples == [16, 64] && per_pixel < 32.0, "{:?}, {per_pixel} rays", report.samples);
+        // At least as many rays.
+        let (even, even_report) = draw(&mut scene(), &TraceOptions { seed, ..evenly(per_pixel as u32) });
+        assert!(even_report.rays >= report.rays);
+        adaptive_error += rms(&adaptive, &reference).powi(2);
+        even_error += rms(&even, &reference).powi(2);
+    }
+    println!(
+        "adaptive: {:.2} of the error of evenly distributed samples",
+        (adaptive_error / even_error).sqrt()
+    );
+    // Without the second pass the error would be that of 16 samples, which is larger.
+    assert!(adaptive_error < 0.7 * even_error, "{adaptive_error:e} for {even_error:e}");
+}
+
+#[test]
+fn pictures_that_end_at_an_error_are_unbiased_within_a_tenth_of_it() {
+    // A picture may end when it happens to look less noisy than it is, which could favour dark ones.
+    let mut world = World::new();
+    exact(
+        &mut world,
+        Quadric::new(QuadricShape::Plane),
+        Material::matt(Vec3::splat(0.6)),
+        Transform::IDENTITY,
+    );
+    let panel = Mesh(Arc::new(shapes::cuboid(Vec3::new(0.6, 0.02, 0.6), 1)));
+    world.spawn((panel, glowing(5.0, 0.2), Transform::from_xyz(0.4, 1.2, 0.0)));
+    let ball = Transform::from_xyz(-0.5, 0.5, 0.0);
+    exact(
+        &mut world,
+        Quadric::sphere(0.5),
+        Material { mirror: Vec3::splat(0.4), ..Material::matt(Vec3::splat(0.3)) },
+        ball,
+    );
+    furnace(&mut world, 0.02);
+    camera(&mut world, DVec3::new(0.0, 1.0, 3.0), DVec3::new(0.0, 0.4, 0.0), 0.6);
+    let side = 6;
+    let mean = |picture: &Picture| {
+        picture.radiance.iter().map(|pixel| pixel.element_sum()).sum::<f64>()
+            / (3.0 * picture.radiance.len() as f64)
+    };
+    // The mean of pictures with different seeds, and its standard error.
+    let mut over = |seeds: std::ops::Range<u32>, asked: TraceOptions| {
+        let count = f64::from(seeds.end - seeds.start);
+        let means: Vec<f64> =
+            seeds.map(|seed| mean(&draw(&mut world, &TraceOptions { seed, ..asked.clone() }).0)).collect();
+        let middle = means.iter().sum::<f64>() / count;
+        let squares: f64 = means.iter().map(|own| (own - middle).powi(2)).sum();
+        (middle, (squares / (count * (count - 1.0))).sqrt())
+    };
+    let (truth, uncertain) = over(1000..1016, paths(side, 1024));
+    let error = 0.15;
+    let (found, own) = over(1..301, TraceOptions { error: Some(error), ..paths(side, 1 << 14) });
+    let (bias, sigma) = ((found - truth) / truth, own.hypot(uncertain) / truth);
+    println!("--error {error}: bias {:.3} % ± {:.3} %", 100.0 * bias, 100.0 * sigma);
+    assert!(sigma < 0.05 * error, "the test sees nothing: {sigma}");
+    assert!(bias.abs() < 0.1 * error + 2.0 * sigma, "{error}: {bias} ± {sigma}");
+}

@@ -10,7 +10,7 @@ mod revolution;
 mod sphere;
 
 pub use flat_sided::{cuboid, plane};
-pub use revolution::{cone, cylinder, torus, uv_sphere};
+pub use revolution::{cone, cylinder, disc, torus, uv_sphere};
 pub use sphere::{MAX_DEPTH, ShapeError, tetrahedral_sphere, try_tetrahedral_sphere};
 
 /// Largest number of segments, rings or columns.

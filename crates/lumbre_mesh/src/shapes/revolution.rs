@@ -43,6 +43,14 @@ pub fn cone(radius: f32, height: f32, segments: u32) -> TriangleMesh {
     mesh
 }
 
+/// A disc about the y axis at height `y` that faces away from the origin, with `segments` (3 to [`MAX_SEGMENTS`])
+/// along its rim.
+pub fn disc(radius: f32, y: f32, segments: u32) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    push_cap(&mut mesh, radius.into(), y.into(), in_range(segments));
+    mesh
+}
+
 /// A torus about the y axis: the centre of the tube is at `major_radius` from the axis, the tube has the
 /// radius `minor_radius`, and there are `segments` around the axis and `sides` around the tube (3 to
 /// [`MAX_SEGMENTS`] each).

@@ -1,4 +1,5 @@
-//! Meshes parametric surfaces with a grid over their parameters. Implicit surfaces are not meshed.
+//! Meshes parametric surfaces with a grid over their parameters. Implicit surfaces
+//! are meshed in `marching_tetrahedra`.
 
 use glam::{DVec2, DVec3};
 

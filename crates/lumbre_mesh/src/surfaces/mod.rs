@@ -1,6 +1,6 @@
 //! Surfaces given by equations, and their normals: the plane through three points, implicit surfaces,
-//! parametric surfaces, and sphere, cylinder, cone and torus in both forms. Meshes of them are in
-//! [`shapes`](crate::shapes) and [`parametric_mesh`].
+//! parametric surfaces, sphere, cylinder, cone and torus in both forms, and general quadrics. Meshes of them are in
+//! [`shapes`](crate::shapes), [`parametric_mesh`] and [`implicit_mesh`].
 //!
 //! ```text
 //!   plane_normal        three points       (p1 - p0) x (p2 - p0)                     [I] Vectores normales
@@ -32,19 +32,23 @@
 mod cone;
 mod cylinder;
 mod implicit;
+mod marching_tetrahedra;
 mod mesher;
 mod parametric;
 mod plane;
 mod pole;
+mod quadric;
 mod sphere;
 mod torus;
 
 pub use cone::Cone;
 pub use cylinder::Cylinder;
 pub use implicit::{ImplicitSurface, central_difference_gradient, implicit_normal};
+pub use marching_tetrahedra::{MAX_CELLS, implicit_mesh};
 pub use mesher::parametric_mesh;
 pub use parametric::{ParametricSurface, difference_partials, parametric_normal};
 pub use plane::plane_normal;
+pub use quadric::GeneralQuadric;
 pub use sphere::Sphere;
 pub use torus::Torus;
 

@@ -46,6 +46,7 @@ mod options;
 mod patch;
 mod prepared;
 mod quadric_extension;
+mod quadric_fallback;
 mod source;
 mod texture_ktx2;
 mod texture_sets;

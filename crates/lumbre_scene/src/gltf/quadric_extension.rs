@@ -32,6 +32,9 @@ pub(crate) struct QuadricExtension {
     /// Maximum corner of the trim box, in metres; `null` where the box is open.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<Corner>,
+    /// Index of the material, for a node without a mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub material: Option<usize>,
 }
 
 /// A corner of the trim box. A component is `None` if it is infinite, for which JSON has no number.

@@ -14,7 +14,7 @@ use super::limits::Budget;
 use super::options::LoadOptions;
 use super::patch::{EarlierBake, Patch, undo_bake};
 use super::uri::{self, Base};
-use super::{compressed, container, instancing};
+use super::{compressed, container, instancing, quadric_fallback};
 
 /// A glTF file as the artist made it, with its JSON, buffers and unknown chunks preserved. Changes made by an
 /// earlier bake are undone when it is read.
@@ -65,18 +65,21 @@ impl SourceFile {
                 "was changed by another program after a bake; what that bake added is taken for the artist's",
             ),
         }
-        let document = Document::from_root(root.clone(), &mut notes)?;
+        let mut document = Document::from_root(root.clone(), &mut notes)?;
         check_extensions(&document)?;
-        let contents = contents(
+        let mut contents = contents(
             &document,
             container.binary,
             Base { folder: Some(&folder), root: options.root.as_deref() },
             &mut notes,
         )?;
         let mut budget = options.limits.budget(bytes.len(), &document, &contents);
+        let mut patch = Patch::new(root);
+        if quadric_fallback::add(&mut patch, &document, &mut contents, &mut budget, &mut notes)? {
+            document = Document::from_root(patch.root(), &mut notes)?;
+        }
         let decoded = compressed::decode(&document, &contents, &mut budget)?;
         let buffers = Buffers { document: &document, bytes: contents, decoded: Cow::Borrowed(&decoded) };
-        let mut patch = Patch::new(root);
         let expanded = instancing::expand(&mut patch, &document, &buffers, &mut budget, &mut notes)?;
         let contents = buffers.bytes.into_iter().map(Cow::into_owned).collect();
         let document = if expanded { Document::from_root(patch.root(), &mut notes)? } else { document };

@@ -155,6 +155,21 @@ pub(crate) fn percent_encoded_path(path: &Path) -> String {
     parts.collect::<Vec<_>>().join("/")
 }
 
+/// Encodes bytes as base64 (RFC 4648) in the standard alphabet, with padding.
+pub(crate) fn base64(bytes: &[u8]) -> String {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for group in bytes.chunks(3) {
+        let byte = |at: usize| u32::from(group.get(at).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for place in 0..4 {
+            let digit = ALPHABET[(bits >> (18 - 6 * place) & 63) as usize];
+            text.push(if place <= group.len() { char::from(digit) } else { '=' });
+        }
+    }
+    text
+}
+
 /// Decodes base64 (RFC 4648) in the standard or URL-safe alphabet, with or without padding.
 fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
     let end = text.len() - text.iter().rev().take_while(|&&byte| byte == b'=').count().min(2);
@@ -200,7 +215,11 @@ mod tests {
         ];
         for (encoded, plain) in vectors {
             assert_eq!(decode_base64(encoded.as_bytes()).unwrap(), plain.as_bytes());
+            assert_eq!(base64(plain.as_bytes()).trim_end_matches('='), encoded.trim_end_matches('='));
+            assert!(base64(plain.as_bytes()).len().is_multiple_of(4));
         }
+        let all: Vec<u8> = (0..=255).collect();
+        assert_eq!(decode_base64(base64(&all).as_bytes()).unwrap(), all);
         assert_eq!(decode_base64(b"A"), None);
         assert_eq!(decode_base64(b"Zg=\n"), None);
     }

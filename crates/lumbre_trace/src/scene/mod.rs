@@ -35,6 +35,8 @@ pub(crate) struct Scene {
     passable: Vec<Passable>,
     /// Whether any object lets part of the light pass, by transmission or alpha blending.
     pub see_through: bool,
+    /// Opposite corners of a box around everything that covers its background in part; `None` if nothing does.
+    covered: Option<[DVec3; 2]>,
     /// Whether any object has holes, by an alpha mask.
     pub holes: bool,
     /// Whether any object is a refracting solid.
@@ -55,6 +57,9 @@ struct Passable {
 /// Beyond this distance of the eye from the world's origin, in metres, the eye becomes the tracer's origin,
 /// as in a frame.
 const FAR: f64 = 512.0;
+/// Margin of the box around everything that covers its background in part, as a fraction of its largest
+/// coordinate: more than the distance at which surfaces count as coplanar.
+const COVERING_MARGIN: f64 = 1e-3;
 /// Largest number of triangles that the hierarchy can index.
 const MAX_TRIANGLES: usize = 1 << 29;
 
@@ -93,6 +98,7 @@ impl Scene {
         let is_open = |found: &Passable| matches!(found.passage, Passage::Clear | Passage::Covering);
         Ok(Self {
             see_through: passable.iter().any(is_open),
+            covered: box_of_coverings(&collected.objects, exact),
             holes: passable.iter().any(|found| found.passage == Passage::Cut),
             solids: passable.iter().any(|found| found.solid),
             passable,
@@ -121,6 +127,11 @@ impl Scene {
     /// Returns how rays pass an object.
     pub fn passage(&self, object: usize) -> Passage {
         self.passable[object].passage
+    }
+
+    /// Returns true if a surface that covers its background in part, such as a decal, may lie over a point.
+    pub fn may_be_covered(&self, point: DVec3) -> bool {
+        self.covered.is_some_and(|[low, high]| point.cmpge(low).all() && point.cmple(high).all())
     }
 
     /// Returns true if an object is a refracting solid.
@@ -156,6 +167,29 @@ impl Scene {
             AlphaMode::Opaque | AlphaMode::Blend => false,
         }
     }
+}
+
+/// Returns opposite corners of a box around all objects that cover their background in part, with a margin for
+/// rounding. `exact` says whether an object is an exact surface, which may be infinite.
+fn box_of_coverings(objects: &[Object], exact: impl Fn(usize) -> bool) -> Option<[DVec3; 2]> {
+    let mut covered: Option<[DVec3; 2]> = None;
+    for (index, object) in objects.iter().enumerate() {
+        if object.passage() != Passage::Covering {
+            continue;
+        }
+        if exact(index) {
+            return Some([DVec3::NEG_INFINITY, DVec3::INFINITY]);
+        }
+        for position in &object.shape.positions {
+            let point = object.place.transform_point3(position.as_dvec3());
+            let [low, high] = covered.get_or_insert([point; 2]);
+            (*low, *high) = (low.min(point), high.max(point));
+        }
+    }
+    covered.map(|[low, high]| {
+        let margin = COVERING_MARGIN * low.abs().max(high.abs()).max_element();
+        [low - margin, high + margin]
+    })
 }
 
 impl Passable {
