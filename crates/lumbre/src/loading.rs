@@ -120,8 +120,8 @@ pub fn frame_options(
     }
     let settings = &mut world.get_resource_or_insert_with(SceneSettings::default).frame;
     settings.light_threshold = frame.light_threshold.unwrap_or(settings.light_threshold);
-    let shadows = frame.shadows || frame.every_shadow || settings.shadows;
-    settings.shadows = shadows && !frame.no_shadows;
+    // --no-shadows is an option of the frame below; rays have it, too, without another scene.
+    settings.shadows |= frame.shadows || frame.every_shadow;
     settings.shadow_resolution = frame.shadow_resolution.unwrap_or(settings.shadow_resolution);
     settings.shadow_filter = frame.shadow_filter.unwrap_or(settings.shadow_filter);
     reduce_lightmaps(world, frame.lightmap_reduction);
