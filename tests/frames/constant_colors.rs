@@ -65,6 +65,7 @@ fn a_colour_that_is_made_once_is_that_of_every_pixel() {
             |pixels: &[Vec4]| pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect::<Vec<_>>();
         let same = same_by_another_pipeline(&colors_of(&constant), &colors_of(&each));
         assert!(same, "{} {shading:?}: {variants} beside {shaded}", display.name());
+        assert!(constant.iter().zip(&each).all(|(one, other)| one.w == other.w), "{}", display.name());
         // OpenGL's display clamps at the vertices and interpolates the clamped colours.
         if display != Display::Clamp || shading == Shading::Phong {
             let colors: std::collections::HashSet<String> =

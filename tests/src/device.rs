@@ -72,7 +72,8 @@ pub fn same_by_another_pipeline(got: &[DVec3], expected: &[DVec3]) -> bool {
     assert_eq!(got.len(), expected.len(), "frames of different sizes");
     let bound = apart_between_pipelines();
     let same = |(got, expected): (&DVec3, &DVec3)| {
-        got == expected || (*got - *expected).abs().max_element() <= bound * expected.max_element().max(1.0)
+        let limit = DVec3::splat(bound * expected.max_element().max(1.0));
+        got == expected || (*got - *expected).abs().cmple(limit).all()
     };
     got.iter().zip(expected).all(same)
 }

@@ -148,6 +148,10 @@ fn meaningless(asked: &Trace) -> Vec<&'static str> {
             asked.frame.shadows || asked.frame.every_shadow || asked.frame.rendering_path.is_some(),
             "--shadows, --every-shadow and --rendering-path change nothing: every lamp casts its shadow, and rays have no rendering path",
         ),
+        (
+            !trees && asked.frame.lightmap_reduction > 1,
+            "--lightmap-reduction means nothing to --integrator path: paths find bounced light themselves",
+        ),
         (asked.frame.no_msaa, "--no-msaa changes nothing: --samples says how many samples a pixel has"),
         (!asked.frame.without.is_empty(), "--without is for frames: rays have every effect of the scene"),
         (!trees && asked.frame.msaa, "--msaa is for the ray tree: paths take --samples"),

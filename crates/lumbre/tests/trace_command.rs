@@ -181,6 +181,8 @@ fn paths_go_on_where_they_were_left() {
         "{}",
         stderr(&other)
     );
+    let of_other_noise = draw("parts.exr", &["--samples", "96", "--resume", "--seed", "2"]);
+    assert!(stderr(&of_other_noise).contains("another picture"), "{}", stderr(&of_other_noise));
     std::fs::write(at("parts.exr.samples"), &kept[..kept.len() / 2]).unwrap();
     let cut = draw("parts.exr", &["--samples", "96", "--resume"]);
     assert!(cut.status.code() == Some(1) && stderr(&cut).contains("damaged"), "{}", stderr(&cut));

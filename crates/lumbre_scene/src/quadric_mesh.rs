@@ -26,8 +26,15 @@ impl Quadric {
     /// A mesh of the surface with `segments` (3 to [`shapes::MAX_SEGMENTS`]) around its axis. General quadrics
     /// have half as many cells along the longest side of their bounds, at most
     /// [`MAX_CELLS`](lumbre_mesh::surfaces::MAX_CELLS). The distance from the surface falls with the square of
-    /// `segments`. Empty if nothing of the surface is inside its trim.
+    /// `segments`. Empty if nothing of the surface is inside its trim, or if f32 cannot hold its
+    /// size.
     pub fn mesh(&self, segments: u32) -> TriangleMesh {
+        let mesh = self.mesh_of_any_size(segments);
+        let finite = mesh.positions.iter().all(|position| position.is_finite());
+        if finite { mesh } else { TriangleMesh::default() }
+    }
+
+    fn mesh_of_any_size(&self, segments: u32) -> TriangleMesh {
         let segments = segments.clamp(3, shapes::MAX_SEGMENTS);
         let rings = (segments / 2).max(2);
         let whole = match self.shape {

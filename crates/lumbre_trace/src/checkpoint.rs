@@ -115,7 +115,7 @@ const PIXEL: usize = 10 * 8 + 3 * 4;
 fn identity(view: &View, aovs: &LightAovs) -> [Fingerprint; 3] {
     let options = &view.options;
     let asked = (options.size, options.integrator, options.depth, options.shadows, options.filter);
-    let view_and_options = (&view.camera, asked, options.sample_by_noise, &aovs.aovs);
+    let view_and_options = (&view.camera, asked, options.seed, options.sample_by_noise, &aovs.aovs);
     [of_debug(&env!("CARGO_PKG_VERSION")), view.scene.fingerprint(), of_debug(&view_and_options)]
 }
 

@@ -62,7 +62,7 @@ pub(crate) fn add(
         };
         match mesh {
             Some(mesh) => patch.set(&place!["nodes", index, "mesh"], mesh.into()),
-            None => notes.add(&name, "nothing of its exact surface is inside min and max; it is left out"),
+            None => notes.add(&name, "nothing of its exact surface is inside min and max, or it is larger than f32 can hold; it is left out"),
         }
     }
     Ok(known.values().any(Option::is_some))
