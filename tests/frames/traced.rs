@@ -25,14 +25,13 @@ const SIZE: u32 = 192;
 /// One step of eight bits.
 const STEP: f64 = 1.0 / 255.0;
 
+/// Options for rays that show no more than a frame without shadows does.
+fn as_a_frame(camera: Option<Entity>) -> TraceOptions {
+    TraceOptions { camera, size: (SIZE, SIZE), depth: Some(0), shadows: false, ..TraceOptions::default() }
+}
+
 fn traced(world: &mut World, reflection: Option<ReflectionModel>) -> Picture {
-    let options = TraceOptions {
-        size: (SIZE, SIZE),
-        depth: Some(0),
-        shadows: false,
-        reflection,
-        ..TraceOptions::default()
-    };
+    let options = TraceOptions { reflection, ..as_a_frame(None) };
     trace(world, &options, &|_| ControlFlow::Continue(())).unwrap().0
 }
 
@@ -137,13 +136,7 @@ fn the_level_is_the_frames_but_for_minified_textures() {
     let camera = cameras.iter(&world).find(|(_, name)| name.as_str() == "tour 06").map(|found| found.0);
     let frame_options = FrameOptions { camera, shading: Some(Shading::Phong), ..linear() };
     let (frame, _) = draw(&mut world, SIZE, SIZE, &frame_options);
-    let options = TraceOptions {
-        camera,
-        size: (SIZE, SIZE),
-        depth: Some(0),
-        shadows: false,
-        ..TraceOptions::default()
-    };
+    let options = as_a_frame(camera);
     let (picture, _) = trace(&mut world, &options, &|_| ControlFlow::Continue(())).unwrap();
     let mut apart: Vec<f64> =
         picture.radiance.iter().zip(&frame).map(|(a, b)| (*a - *b).abs().max_element()).collect();
@@ -297,13 +290,7 @@ fn the_level_without_textures_is_the_frames_inside_every_surface() {
             ..linear()
         };
         let (frame, _) = draw(&mut world, SIZE, SIZE, &options);
-        let options = TraceOptions {
-            camera,
-            size: (SIZE, SIZE),
-            depth: Some(0),
-            shadows: false,
-            ..TraceOptions::default()
-        };
+        let options = as_a_frame(camera);
         let (picture, _) = trace(&mut world, &options, &|_| ControlFlow::Continue(())).unwrap();
         let tracer = Tracer::new(&mut world, &options).unwrap();
         // Inside: the pixel and its neighbours show one object, without a crease and without a step in depth.

@@ -18,7 +18,7 @@ const ENOUGH_LIGHTS_ON_A_GPU: u32 = 1024;
 /// Most pixels of the frame per triangle of the scene at which it gains. Blocks of 16 pixels are shaded for
 /// each triangle, and larger triangles fill them.
 const MAX_PIXELS: u64 = 16;
-/// The same of a GPU, which shades blocks of four pixels but also spreads the work of all triangles evenly.
+/// The same of a GPU; the H100 gained with 28.
 const MAX_PIXELS_ON_A_GPU: u64 = 32;
 
 /// The rendering path of a frame, by the reason for it.

@@ -205,6 +205,7 @@ fn exact_surfaces_without_a_mesh_get_one() {
     assert_eq!((quadric, material.front.diffuse), (&Quadric::sphere(0.5), Vec3::new(0.5, 0.25, 0.125)));
     let expected = quadric.mesh(Quadric::SEGMENTS);
     assert_eq!((&mesh.0.positions, &mesh.0.indices), (&expected.positions, &expected.indices));
+    assert!(!expected.uv0.is_empty() && mesh.0.uv0 == expected.uv0, "textures lie as on one made in a World");
     // It comes back from a saved file with its mesh, for programs that know no exact surfaces.
     let folder = tempfile::tempdir().expect("there is a folder for temporary files");
     let path = folder.path().join("bare.glb");
@@ -225,6 +226,17 @@ fn exact_surfaces_without_a_mesh_get_one() {
             load_slice(&mut World::new(), bare.as_bytes(), "bare.gltf", None).expect("the file is sound");
         assert!(report.notes.iter().any(|note| note.to_string().contains(word)), "{:?}", report.notes);
     }
+    // A larger one than f32 can hold is left out, and a wrong material is reported at its own field.
+    let read_sphere = |members: &str| {
+        let json = format!(r#""LUMBRE_quadric":{{"kind":"sphere",{members}}}"#);
+        let bare = String::from_utf8(file("", &json)).expect("it is text").replace("\"mesh\":0,", "");
+        load_slice(&mut World::new(), bare.as_bytes(), "bare.gltf", None)
+    };
+    let huge = read_sphere(r#""radius":1e60"#).expect("the file is sound");
+    assert!(huge.notes.iter().any(|note| note.to_string().contains("f32")), "{:?}", huge.notes);
+    let error =
+        format!("{:#}", read_sphere(r#""radius":1,"material":7"#).expect_err("there is one material"));
+    assert!(error.contains("LUMBRE_quadric.material"), "{error}");
     // In a World: on insertion, and again for another surface; a mesh of its own is kept.
     let mut world = World::new();
     let entity = world.spawn((Quadric::sphere(1.0), Material::default())).id();

@@ -70,8 +70,12 @@ pub(crate) fn choose(points: &[(&Point, f64)], goal: Goal) -> Option<usize> {
 }
 
 /// Returns the ways of the last measurement that no other one beats in time, error and bytes, from the cheapest
-/// to the most accurate.
-pub(crate) fn front(found: &Candidates, bytes: impl Fn(&DrawSettings) -> f64) -> Vec<usize> {
+/// to the most accurate. The chosen one is among them, even if another one was quicker this time.
+pub(crate) fn front(
+    found: &Candidates,
+    chosen: Option<usize>,
+    bytes: impl Fn(&DrawSettings) -> f64,
+) -> Vec<usize> {
     let numbers = |&place: &usize| {
         let point = &found.points[place];
         let time = point.milliseconds?.median;
@@ -83,7 +87,8 @@ pub(crate) fn front(found: &Candidates, bytes: impl Fn(&DrawSettings) -> f64) ->
             place != other && its != own && its.iter().zip(own).all(|(its, own)| its <= own)
         })
     };
-    let mut front: Vec<&(usize, [f64; 3])> = all.iter().filter(|one| !is_beaten(one)).collect();
+    let mut front: Vec<&(usize, [f64; 3])> =
+        all.iter().filter(|one| Some(one.0) == chosen || !is_beaten(one)).collect();
     front.sort_by(|(_, a), (_, b)| b[1].total_cmp(&a[1]).then(a[0].total_cmp(&b[0])));
     front.into_iter().map(|(place, _)| *place).collect()
 }

@@ -46,8 +46,8 @@ pub struct Tuned {
     pub study: Study,
     /// The settings of each point of the study.
     pub settings: Vec<DrawSettings>,
-    /// Indices of the points that no other one beats in time, error and bytes of lightmaps, from the cheapest to
-    /// the most accurate.
+    /// Indices of the points that no other one beats in time, error and bytes of lightmaps, and of the chosen one,
+    /// from the cheapest to the most accurate.
     pub front: Vec<usize>,
     /// Index of the point that reaches the goal best; `None` if none does.
     pub chosen: Option<usize>,
@@ -195,7 +195,7 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
         chosen =
             chosen.map(|chosen| lightmap_density::choose(&points, goal).map_or(chosen, |one| places[one]));
         of_lightmaps = lightmap_density::findings(&points);
-        front = lightmap_density::front(&found, sizes);
+        front = lightmap_density::front(&found, chosen, sizes);
     }
     let Candidates { settings, points, .. } = found;
     let mut study = Study { points, ..std::mem::take(&mut measured.study) };

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use lumbre_mesh::TriangleMesh;
 use serde_json::{Map, Value, json};
 
-use super::document::{Document, extension};
+use super::document::{Document, element, extension};
 use super::error::{LoadProblem, Notes};
 use super::limits::Budget;
 use super::patch::{Patch, place};
@@ -17,8 +17,9 @@ use crate::Quadric;
 
 const EXTENSION: &str = "LUMBRE_quadric";
 
-/// Bytes of a mesh per index: its own four, and about a sixth of a vertex.
-const BYTES_PER_INDEX: usize = 8;
+/// Bytes that are kept of a mesh per index, of which there are about six per vertex of up to 32 bytes: ten of its data
+/// and 14 of their text.
+const BYTES_PER_INDEX: usize = 24;
 
 /// Returns true if a node of the file has an exact surface and no mesh.
 pub(crate) fn is_used(root: &Map<String, Value>) -> bool {
@@ -46,6 +47,10 @@ pub(crate) fn add(
         };
         let Some(found) = found else { continue };
         let surface = found.surface(&name)?;
+        if let Some(material) = found.material {
+            let field = || format!("{name}.extensions.{EXTENSION}.material");
+            element(&document.materials, "materials", material, field)?;
+        }
         if surface.is_endless() {
             let reach = Quadric::MESH_REACH;
             notes.add(&name, format!("its exact surface has no end; frames and bakes have it up to {reach} m from its origin: give min and max"));
@@ -78,14 +83,19 @@ fn push(
     let floats = |list: &[glam::Vec3]| -> Vec<u8> {
         list.iter().flat_map(|own| own.to_array()).flat_map(f32::to_le_bytes).collect()
     };
+    let coordinates: Vec<u8> =
+        mesh.uv0.iter().flat_map(|own| own.to_array()).flat_map(f32::to_le_bytes).collect();
     let indices: Vec<u8> = mesh.indices.iter().flat_map(|index| index.to_le_bytes()).collect();
-    let parts = [floats(&mesh.positions), floats(&mesh.normals), indices];
+    let parts = [floats(&mesh.positions), floats(&mesh.normals), indices, coordinates];
     let bytes = parts.concat();
     let uri = format!("data:application/octet-stream;base64,{}", uri::base64(&bytes));
     let buffer = patch.push("buffers", json!({"byteLength": bytes.len(), "uri": uri}));
     contents.push(Cow::Owned(bytes));
     let mut offset = 0;
-    let [positions, normals, indices] = parts.map(|part| {
+    let [positions, normals, indices, coordinates] = parts.map(|part| {
+        if part.is_empty() {
+            return 0;
+        }
         let view = json!({"buffer": buffer, "byteOffset": offset, "byteLength": part.len()});
         offset += part.len();
         patch.push("bufferViews", view)
@@ -103,6 +113,11 @@ fn push(
         json!({"bufferView": indices, "componentType": 5125, "count": mesh.indices.len(), "type": "SCALAR"});
     let indices = patch.push("accessors", numbers);
     let mut primitive = json!({"attributes": {"POSITION": positions, "NORMAL": normals}, "indices": indices});
+    if !mesh.uv0.is_empty() {
+        let numbers =
+            json!({"bufferView": coordinates, "componentType": 5126, "count": count, "type": "VEC2"});
+        primitive["attributes"]["TEXCOORD_0"] = patch.push("accessors", numbers).into();
+    }
     if let Some(material) = material {
         primitive["material"] = material.into();
     }
