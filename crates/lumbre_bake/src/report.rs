@@ -233,7 +233,11 @@ pub struct BakeReport {
     /// Estimated RMSE that sampling leaves in the lightmap. The error of each texel is taken relative to the light
     /// around it, as a viewer whose eyes have adapted to that room would see it.
     pub estimated_error: f64,
-    /// The same errors, relative to the mean irradiance of the whole level.
+    /// The same over what is in view from a place of the level, where that is worst (the worst 5 % of all texels apart):
+    /// the error in the level's worst room, which easier rooms and the outside do not make smaller.
+    #[serde(default)]
+    pub error_in_worst_view: f64,
+    /// The same errors as `estimated_error`, relative to the mean irradiance of the whole level.
     pub error_of_mean: f64,
     /// The sources of `estimated_error`, the largest first.
     #[serde(default)]
@@ -245,7 +249,8 @@ pub struct BakeReport {
     /// The estimated error over time: after each round of the final gather (or after direct light, if nothing bounces),
     /// and at the end. Empty if there was nothing to bake.
     pub curve: Vec<ErrorAtTime>,
-    /// Whether the estimated error is at most [`BakeOptions::error`](crate::BakeOptions::error).
+    /// Whether `estimated_error` and `error_in_worst_view` are at most
+    /// [`BakeOptions::error`](crate::BakeOptions::error).
     pub error_reached: bool,
     /// The error that is due to the map's resolution. It is not part of `estimated_error`.
     pub resolution: ResolutionReport,
@@ -327,8 +332,13 @@ impl std::fmt::Display for BakeReport {
             f,
             "{maps} maps, {texels} texels ({coverage:.0} % covered, {hidden_texels} partly hidden) in {seconds:.2} s on {threads} threads"
         )?;
-        let [error, of_mean] = [self.estimated_error, self.error_of_mean].map(Percent);
-        writeln!(f, "estimated error {error} of the light around, {of_mean} of the level's mean: {ended}")?;
+        let [error, in_worst_view, of_mean] =
+            [self.estimated_error, self.error_in_worst_view, self.error_of_mean].map(Percent);
+        writeln!(
+            f,
+            "estimated error {error} of the light around, {in_worst_view} in the worst room's view, {of_mean} of the level's \
+             mean: {ended}"
+        )?;
         if let Some(parts) = self.error_parts_in_words() {
             writeln!(f, "  {parts}")?;
         }

@@ -21,6 +21,32 @@ pub(crate) struct SampleAllocation {
     pub samples: u32,
 }
 
+/// Variances and a goal for their sum, weighted such that each texel's variance falls to a share of its own when the
+/// sum reaches the goal.
+pub(crate) struct WeightedGoal {
+    /// Per covered texel, how much its variance counts.
+    pub weights: Vec<f32>,
+    /// Per covered texel, its variance times its weight.
+    pub variances: Vec<f32>,
+    /// What may be left of the sum of these variances.
+    pub sum: f64,
+}
+
+impl WeightedGoal {
+    /// `shares` are what may be left of the variances, in (0, 1], per covered texel like them; `texels` are those that
+    /// may get more samples, and `order` is that of their convergence.
+    pub fn new(variances: &[f32], shares: &[f32], texels: &[CoveredTexel], order: f64) -> Self {
+        // Where the least worth of a sample is c, and a variance counts w times, it falls to (c / w)^(p / (1 + p)) of
+        // what it would be for a worth and a weight of 1.
+        let exponent = -((1.0 + order) / order) as f32;
+        let weights: Vec<f32> = shares.par_iter().map(|share| share.powf(exponent)).collect();
+        let variances: Vec<f32> =
+            variances.par_iter().zip(&weights).map(|(variance, weight)| variance * weight).collect();
+        let left = |texel: &CoveredTexel| f64::from(variances[texel.place()] * shares[texel.place()]);
+        Self { sum: texels.iter().map(left).sum(), weights, variances }
+    }
+}
+
 /// Texels that may get more samples. Lists are per covered texel.
 pub(crate) struct SampleAllocator<'a> {
     pub texels: &'a [CoveredTexel],
@@ -186,6 +212,19 @@ mod tests {
         assert!(allocator.within(3, 1e-3).is_empty());
         let plenty = allocator.within(1 << 20, 6.0);
         assert_eq!(plenty, allocator.reach(6.0));
+    }
+
+    #[test]
+    fn with_weights_each_texel_keeps_its_own_share() {
+        // Four texels of equal variance, of which two may keep all of it and two an eighth.
+        let (variances, shares) = ([1.0f32; 4], [1.0, 1.0, 0.125, 0.125]);
+        let texels = CoveredTexel::all(4).collect::<Vec<_>>();
+        let goal = WeightedGoal::new(&variances, &shares, &texels, 1.0);
+        assert_eq!((goal.weights[0], goal.weights[2]), (1.0, 64.0));
+        let allocated = allocator(&texels, &goal.variances, &[4; 4], 1024).reach(goal.sum);
+        // Without weights, all four would get equally many.
+        let wanted = |place| SampleAllocation { texel: CoveredTexel(place), samples: 32 };
+        assert_eq!(allocated, [wanted(2), wanted(3)]);
     }
 
     #[test]

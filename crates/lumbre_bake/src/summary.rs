@@ -67,14 +67,15 @@ pub(crate) fn write_errors(
     let gathered = gathered.unwrap_or_else(|| {
         let ledger = ErrorLedger::of_direct_light(texels, direct);
         let error = MapError::new(&ledger, &indirect.variances, mean);
-        let ended = Ended::after(error.relative <= options.error, monitor.is_late(), true);
+        let ended = Ended::after(error.reaches(options.error), monitor.is_late(), true);
         let curve = vec![ErrorAtTime { seconds: monitor.seconds(), error: error.relative }];
         GatherReport { error, curve, ended, leaked_rays: 0, gather_rays: 0.0 }
     });
     let error = gathered.error;
     report.estimated_error = error.relative;
     report.error_of_mean = error.of_mean;
-    report.error_reached = error.relative <= options.error;
+    report.error_in_worst_view = error.in_worst_view;
+    report.error_reached = error.reaches(options.error);
     report.error_parts = error.parts;
     report.curve = gathered.curve;
     report.ended = gathered.ended;

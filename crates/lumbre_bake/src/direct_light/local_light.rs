@@ -8,6 +8,7 @@
 
 use rayon::prelude::*;
 
+use super::views::Views;
 use crate::BakeError;
 use crate::chunks::{decide, in_chunks_uncheckpointed};
 use crate::color::channel_mean;
@@ -38,6 +39,8 @@ const SEED: u32 = 0;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LocalLight {
     irradiance: Vec<f32>,
+    /// What is in view from each block of texels.
+    pub views: Views,
 }
 
 /// The result of one walk from a block.
@@ -120,7 +123,12 @@ impl LocalLight {
                 (root * root).max(FLOOR * mean).max(f64::from(f32::MIN_POSITIVE)) as f32
             })
             .collect();
-        Ok(Self { irradiance: blocks.group_of.iter().map(|&block| local_light[block as usize]).collect() })
+        let views = Views::new(texels, blocks, |block| {
+            let seen = walks[block].iter().flat_map(|walk| walk.in_view);
+            seen.map(|seen| seen.unwrap_or(block as u32)).collect()
+        });
+        let irradiance = blocks.group_of.iter().map(|&block| local_light[block as usize]).collect();
+        Ok(Self { irradiance, views })
     }
 }
 

@@ -12,6 +12,7 @@ pub(crate) mod local_light;
 pub(crate) mod shafts;
 pub(crate) mod shared_light;
 mod source_sampler;
+pub(crate) mod views;
 
 pub(crate) use local_light::LocalLight;
 pub(crate) use source_sampler::SHORT_OF_TIME;

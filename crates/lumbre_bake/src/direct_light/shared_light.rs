@@ -9,12 +9,13 @@ use serde::{Deserialize, Serialize};
 
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
+use super::views::ErrorsInViews;
 use crate::chunks::{decide, in_chunks, in_chunks_until_deadline};
 use crate::coverage::{Texel, TileSequence, receiver};
 use crate::denoise::replicates::mean;
 use crate::denoise::{Denoised, Estimates, Nearness, Neighbourhoods, REPLICATES};
 use crate::monitor::BakeMonitor;
-use crate::sample_allocation::{SampleAllocator, take_samples};
+use crate::sample_allocation::{SampleAllocator, WeightedGoal, take_samples};
 use crate::sampling::{Stream, hash};
 use crate::sources::{Direct, Sources};
 use crate::texel_index::CoveredTexel;
@@ -175,7 +176,7 @@ impl<'a> SharedLight<'a> {
             let summed =
                 |squares: &[f32]| sampled.iter().map(|texel| f64::from(squares[texel.place()])).sum::<f64>();
             let left = summed(&relative.expected);
-            let is_stalled = left > STALLED * before;
+            let errors = ErrorsInViews::new(&local.views, &relative.expected);
             let samples: Vec<u32> = self.sums.iter().map(|sums| sums.samples).collect();
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
             let count = sampled.len() as u64;
@@ -183,26 +184,29 @@ impl<'a> SharedLight<'a> {
             let budget = budget.saturating_sub(taken);
             // Samples are allocated by the cautious errors, but the goal is for the expected ones: scale it.
             let caution = summed(&relative.cautious) / left;
-            let allocator = SampleAllocator {
+            let allocator = |variances| SampleAllocator {
                 texels: &sampled,
-                variances: &relative.cautious,
+                variances,
                 samples: &samples,
                 most: self.most,
                 order: ORDER,
             };
-            let allocate = |goal: f64| allocator.within(budget, caution * goal);
             // Before a round can reach the least share, a few uncertain texels dominate and the samples of the others
             // cannot be foreseen.
             if chosen_share.is_none() && left <= MAX_REDUCTION * goal(least) {
-                let foreseen = taken + allocator.added(&allocate(goal(least)));
+                let allocator = allocator(&relative.cautious);
+                let foreseen = taken + allocator.added(&allocator.within(budget, caution * goal(least)));
                 chosen_share = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
             }
             let goal = goal(chosen_share.unwrap_or(least));
-            if left <= goal * ENOUGH || is_stalled {
+            let over = errors.over(goal);
+            if over <= ENOUGH || over * goal > STALLED * before {
                 return Ok(());
             }
-            before = left;
-            let allocated = allocate(goal.max(left / MAX_REDUCTION));
+            before = over * goal;
+            let shares = errors.shares(goal, MAX_REDUCTION.recip());
+            let goal = WeightedGoal::new(&relative.cautious, &shares, &sampled, ORDER);
+            let allocated = allocator(&goal.variances).within(budget, goal.sum);
             monitor.pass(PASS);
             let mut sums = std::mem::take(&mut self.sums);
             let taken = take_samples(&allocated, &mut sums, monitor, |to, mut sums| {

@@ -7,11 +7,12 @@ use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
 use super::shafts::Shafts;
 use super::shared_light::SharedLight;
+use super::views::ErrorsInViews;
 use crate::chunks::{decide, in_chunks};
 use crate::coverage::{CoveredTexels, Texel, receiver};
 use crate::denoise::Neighbourhoods;
 use crate::monitor::BakeMonitor;
-use crate::sample_allocation::{SampleAllocation, SampleAllocator, take_samples};
+use crate::sample_allocation::{SampleAllocation, SampleAllocator, WeightedGoal, take_samples};
 use crate::sampling::{Sequence, Stream};
 use crate::sources::{Direct, SampledReceiver, Sources, VisibilitySummary};
 use crate::texel_index::{CoveredTexel, MapTexel};
@@ -41,7 +42,7 @@ impl IndividualLight {
 
     /// The sum of the texels' expected variances, each relative to the squared local light.
     pub fn variance_left(&self, local: &LocalLight) -> f64 {
-        sum(&self.relative_variances(local))
+        local.views.sum(&self.relative_variances(local))
     }
 }
 
@@ -203,7 +204,8 @@ impl<'a> SourceSampler<'a> {
     }
 
     /// Takes more samples of doubtful texels, up to `most`, mostly at the edges of shadows, until the sum of squared
-    /// errors is down to `goal`, no texel can have more, or the time is up.
+    /// errors is down to `goal` and in every view their mean to that of the goal, no texel can have more, or the time is
+    /// up.
     pub fn refine(
         &self,
         light: &mut IndividualLight,
@@ -214,12 +216,15 @@ impl<'a> SourceSampler<'a> {
     ) -> Result<(), BakeError> {
         loop {
             let variances = light.relative_variances(local);
-            if sum(&variances) <= goal {
+            let errors = ErrorsInViews::new(&local.views, &variances);
+            if errors.over(goal) <= 1.0 {
                 return Ok(());
             }
             let (texels, samples) = (&light.doubtful, &light.samples);
-            let allocator = SampleAllocator { texels, variances: &variances, samples, most, order: ORDER };
-            let allocated = allocator.reach(goal);
+            let goal = WeightedGoal::new(&variances, &errors.shares(goal, LEAST_SHARE), texels, ORDER);
+            let allocator =
+                SampleAllocator { texels, variances: &goal.variances, samples, most, order: ORDER };
+            let allocated = allocator.reach(goal.sum);
             if self.sample(&allocated, light, monitor)? == 0 {
                 return Ok(());
             }
@@ -260,6 +265,9 @@ const REACH: u32 = 2;
 /// The power of the number of samples with which the variance falls at straight edges of shadows, as measured.
 pub(crate) const ORDER: f64 = 1.5;
 
+/// The least share of a squared error that a pass aims to leave.
+const LEAST_SHARE: f64 = 1e-3;
+
 /// A pass's usual share of the time that it and the passes after it take.
 const PASS: f32 = 0.5;
 
@@ -269,7 +277,3 @@ pub(crate) const SHORT_OF_TIME: f64 = 0.3;
 
 /// Shadow rays of a texel in the first pass if time is short or over: still enough to estimate the error from their spread.
 const LATE_SAMPLES: u32 = 4;
-
-fn sum(numbers: &[f32]) -> f64 {
-    numbers.iter().map(|&number| f64::from(number)).sum()
-}

@@ -10,6 +10,10 @@ pub(crate) struct MapError {
     pub relative_squares: f64,
     /// Square root of their mean.
     pub relative: f64,
+    /// The mean of the squared relative errors over the view from each block of texels.
+    pub in_views: Vec<f64>,
+    /// Square root of the largest of these that counts.
+    pub in_worst_view: f64,
     /// RMSE relative to the mean irradiance of the map.
     pub of_mean: f64,
     /// What it is made of, the largest part first.
@@ -21,12 +25,31 @@ impl MapError {
     /// channels.
     pub fn new(ledger: &ErrorLedger<'_>, errors: &SquaredErrors, mean: f64) -> Self {
         let open = ledger.open_texels();
-        let relative_squares = ledger.relative_sum(&errors.expected) - ledger.by_chance();
+        let relative = ledger.direct.local.relative(&errors.expected);
+        let sum = open_sum(&ledger.texels.list, &relative);
+        let relative_squares = sum - ledger.by_chance();
+        // Chance, which cancels in the mean of many texels, does so in a view too.
+        let without_chance = if sum > 0.0 { (relative_squares / sum).max(0.0) } else { 1.0 };
+        let views = &ledger.direct.local.views;
+        let in_views: Vec<f64> =
+            views.means(&relative).into_iter().map(|square| without_chance * square).collect();
         Self {
             relative_squares,
             relative: root(relative_squares / open),
+            in_worst_view: root(views.worst(&in_views)),
+            in_views,
             of_mean: relative_to(mean, open_sum(&ledger.texels.list, &errors.expected) / open),
             parts: ledger.parts(),
         }
+    }
+
+    /// The larger one of the whole level's error and that in the worst view.
+    pub fn worst(&self) -> f64 {
+        self.relative.max(self.in_worst_view)
+    }
+
+    /// Whether both the whole level and its worst view have at most this error.
+    pub fn reaches(&self, requested: f64) -> bool {
+        self.worst() <= requested
     }
 }

@@ -13,6 +13,7 @@ pub(crate) mod map_error;
 pub(crate) mod patch_fallback;
 pub(crate) mod radiance_cache;
 pub(crate) mod reused_gather;
+mod round_goals;
 pub(crate) mod rounds;
 pub(crate) mod steep_light;
 pub(crate) mod texel_radiance;

@@ -6,13 +6,14 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::error_estimate::{PatchBias, TexelReads, patch_bias};
-use super::error_ledger::{ErrorLedger, GatherErrors, open_sum};
+use super::error_ledger::{ErrorLedger, GatherErrors};
 use super::first_round::{ROUND_PROGRESS, cast_first_round};
 use super::gather_sums::GatherSums;
 use super::learned_guide::learn;
 use super::map_error::MapError;
 use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
+use super::round_goals::{CONVERGENCE_ORDER, ErrorLeft, TARGET};
 use crate::chunks::decide;
 use crate::color::wide_channel_mean;
 use crate::coverage::CoveredTexels;
@@ -26,11 +27,6 @@ use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions, Ended, ErrorAtTime};
 
-/// More rays are not worthwhile if the error that they can reduce is less than this fraction of the squared error.
-const MIN_REDUCIBLE: f64 = 0.1;
-/// Fraction of the requested squared error that a round aims at. It is well below 1 because a round's outcome is
-/// predicted only roughly, and missing the request would cost another round, with another smoothing of everything.
-const TARGET: f64 = 0.65;
 /// The rest of the way is a small step if the requested squared error is more than this fraction of the remaining one.
 /// When the quality's rays are spent, a small step may still be taken: a map that just misses the requested error helps
 /// nobody.
@@ -40,11 +36,6 @@ const SMALL_STEP_RAYS: f64 = 1.25;
 /// [`TARGET`] of a small step, per unit of the requested over the remaining squared error. It is closer to 1, as the
 /// outcome is predicted better the less a round has to reduce the error.
 const SMALL_STEP_TARGET: f64 = 0.9;
-/// Exponent p of the variance n^-p after n samples: between 1, for random samples, and 3, for a Sobol sequence and a
-/// smooth integrand.
-const CONVERGENCE_ORDER: f64 = 1.25;
-/// Largest factor by which one round tries to reduce the reducible squared error: the first estimates of it are rough.
-const MAX_REDUCTION: f64 = 8.0;
 /// The quality's rays count as spent if those left are less than this fraction of those cast: so few are not worth
 /// another smoothing.
 const MIN_ROUND: f64 = 0.15;
@@ -118,15 +109,15 @@ pub(crate) fn gather(
     let (result, ended) = loop {
         let begun = monitor.seconds();
         let result = planner.evaluate(&gathered, &reads, cache.exchange.residual_bound, monitor)?;
-        let error = result.error.relative;
-        let is_reached = error <= options.error;
-        curve.push(ErrorAtTime { seconds: result.seconds, error });
+        let is_reached = result.error.reaches(options.error);
+        curve.push(ErrorAtTime { seconds: result.seconds, error: result.error.relative });
         // A round needs time for its rays, and for another evaluation.
         let affordable = speed.affordable_samples(monitor.seconds() - begun, monitor.clock());
-        let next = planner.plan(&gathered, &result, decide(monitor, affordable)?);
+        let left = planner.left(&gathered, &result);
+        let next = planner.plan(&gathered, &result.error, &left, decide(monitor, affordable)?);
         let is_late = !in_time || monitor.clock().is_over() || next.is_late;
-        let is_hardly_reducible = next.reducible_error <= MIN_REDUCIBLE * result.error.relative_squares;
-        let has_stalled = plan.as_ref().is_some_and(|plan| plan.has_stalled(next.reducible_error));
+        let is_hardly_reducible = left.is_hardly_reducible(options.error.powi(2), planner.count());
+        let has_stalled = plan.as_ref().is_some_and(|plan| plan.has_stalled(&left));
         stalled_rounds = if has_stalled { stalled_rounds + 1 } else { 0 };
         let ended = Ended::after(is_reached, is_late || monitor.is_late(), next.is_last);
         let rays_gain_nothing = is_hardly_reducible || stalled_rounds == MAX_STALLED_ROUNDS;
@@ -219,8 +210,9 @@ struct RoundPlan {
     wanted: Vec<SampleAllocation>,
     /// Samples of each replicate that it adds, of all texels together.
     added: u64,
-    /// The part of [`MapError::relative_squares`] that rays reduce.
-    reducible_error: f64,
+    /// How much the error of each texel counts, and the sum of those that rays reduce.
+    weights: Vec<f32>,
+    reducible_sum: f64,
     /// The quality's rays are spent, or no texel would get more: there is no next round.
     is_last: bool,
     /// The quality's rays are spent, but the requested error is only a small step away.
@@ -230,11 +222,10 @@ struct RoundPlan {
 }
 
 impl RoundPlan {
-    /// Returns true if the round that followed this plan hardly reduced the error: `left` is its reducible error
-    /// afterwards.
-    fn has_stalled(&self, left: f64) -> bool {
+    /// Returns true if the round that followed this plan hardly reduced the error: `left` is what there is afterwards.
+    fn has_stalled(&self, left: &ErrorLeft<'_>) -> bool {
         let stalled = if self.is_small_step { SMALL_STEP_STALLED } else { STALLED };
-        left > stalled * self.reducible_error
+        left.reducible_sum(&self.weights) > stalled * self.reducible_sum
     }
 }
 
@@ -302,30 +293,37 @@ impl<'a> RoundPlanner<'a> {
         let variances = ledger.total();
         let error = monitor.run_interruptible(1.0, || MapError::new(&ledger, &variances, total))?;
         let seconds = monitor.seconds();
-        monitor.note_error(error.relative);
+        monitor.note_error(error.worst());
         monitor.advance(1.0)?;
         let light = without_patch_bias(&denoised.estimates, &patches);
         Ok(RoundResult { light, variances, reducible: denoised.errors(), error, seconds })
     }
 
-    /// Allocates the rays of the next round such that they reduce the reducible part of the error to what is needed to
-    /// reach the requested one. At most `affordable` samples per replicate can be cast in the time that is left.
-    fn plan(&self, gathered: &[GatherSums], result: &RoundResult, affordable: u64) -> RoundPlan {
-        let [_, max_samples] = self.options.effort().gather.map(|samples| samples / REPLICATES as u32);
+    /// The error that is left after a round, and the part of it that rays reduce.
+    fn left(&self, gathered: &[GatherSums], result: &RoundResult) -> ErrorLeft<'_> {
         // From the second round on, rays read the light of texels instead of patches, and so also reduce the error that
         // was read from patches. The bias that is measured by checks against real bounces is not counted as reducible.
         let read: Vec<f32> = gathered.par_iter().map(GatherSums::squared_read_error).collect();
-        let by_rays = self.direct.local.relative_errors(&result.reducible.with(&read));
-        let reducible_error = open_sum(&self.texels.list, &by_rays.expected);
-        let irreducible_error = result.error.relative_squares - reducible_error;
-        let requested = self.count() * self.options.error.powi(2);
+        ErrorLeft::new(&self.direct.local, &result.error, &result.reducible.with(&read))
+    }
 
+    /// Allocates the rays of the next round such that they reduce the reducible part of the error to what is needed to
+    /// reach the requested one. At most `affordable` samples per replicate can be cast in the time that is left.
+    fn plan(
+        &self,
+        gathered: &[GatherSums],
+        error: &MapError,
+        left: &ErrorLeft<'_>,
+        affordable: u64,
+    ) -> RoundPlan {
+        let [_, max_samples] = self.options.effort().gather.map(|samples| samples / REPLICATES as u32);
         let samples: Vec<u32> = gathered.iter().map(|sums| sums.samples).collect();
         let cast = all_samples(gathered);
         let limit = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
         let budget = limit.saturating_sub(cast);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
-        let requested_over_left = requested / result.error.relative_squares.max(f64::MIN_POSITIVE);
+        let requested = self.options.error.powi(2);
+        let requested_over_left = requested / error.worst().powi(2).max(f64::MIN_POSITIVE);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP;
         let (target, budget) = match is_small_step {
             true => {
@@ -334,36 +332,30 @@ impl<'a> RoundPlanner<'a> {
             }
             false => (TARGET, budget),
         };
-        // The reducible error may be as large as the irreducible one leaves room for below the target, or negligible
-        // beside it.
-        let goal = (target * requested - irreducible_error)
-            .max(MIN_REDUCIBLE * irreducible_error)
-            .max(reducible_error / MAX_REDUCTION);
-        // Rays are allocated by the cautious errors, so the goal for the expected ones is scaled to those.
-        let goal =
-            goal * open_sum(&self.texels.list, &by_rays.cautious) / reducible_error.max(f64::MIN_POSITIVE);
+        let goal = left.goal(target * requested, &self.open);
         let allocator = SampleAllocator {
             texels: &self.open,
-            variances: &by_rays.cautious,
+            variances: &goal.variances,
             samples: &samples,
             most: max_samples,
             order: CONVERGENCE_ORDER,
         };
-        let mut wanted = allocator.within(budget, goal);
+        let mut wanted = allocator.within(budget, goal.sum);
         let is_short_of_time = allocator.added(&wanted) > affordable;
         let is_late = is_short_of_time && (affordable as f64) < MIN_ROUND * cast as f64;
         if is_late {
             wanted = Vec::new();
         } else if is_short_of_time {
-            wanted = allocator.within(affordable, goal);
+            wanted = allocator.within(affordable, goal.sum);
         }
         RoundPlan {
-            reducible_error,
+            reducible_sum: left.reducible_sum(&goal.weights),
             is_last: (is_spent && !is_small_step) || (wanted.is_empty() && !is_late),
             is_small_step,
             is_late,
             added: allocator.added(&wanted),
             wanted,
+            weights: goal.weights,
         }
     }
 }

@@ -116,8 +116,7 @@ impl Sources<'_> {
             Some(known) if !placed.is_sized() => self.past_shadows(index, known, sampled, direct),
             known => {
                 let clear = matches!(known, Some(LightVisibility::Clear));
-                let center = if placed.is_sized() { None } else { self.near_field_mean(placed, sampled) };
-                self.by_shadow_rays(index, (clear, center), sampled, direct)
+                self.by_shadow_rays(index, clear, sampled, direct)
             }
         };
         let color = placed.light.diffuse;
@@ -142,11 +141,11 @@ impl Sources<'_> {
     }
 
     /// Mean irradiance by a light per unit of its colour, and its variance, estimated by samples. Casts no rays if the
-    /// light is known to be `clear`; `center` is the unoccluded mean of its centre's light, if known.
+    /// light is known to be `clear`.
     fn by_shadow_rays(
         &self,
         index: u32,
-        (clear, center): (bool, Option<f32>),
+        clear: bool,
         sampled: &SampledReceiver<'_, impl SurfacePoints>,
         direct: &mut Direct,
     ) -> (f32, f32) {
@@ -154,6 +153,8 @@ impl Sources<'_> {
         let mut estimate = LightEstimate::default();
         let sequence = sampled.sequence.of(1 + index);
         let (is_sized, samples) = (light.is_sized(), sampled.samples);
+        // The unoccluded mean of its centre's light, if known.
+        let center = if is_sized { None } else { self.near_field_mean(light, sampled) };
         let samples = if center.is_some() && !clear { samples.max(NEAR_SAMPLES) } else { samples };
         for sample in 0..samples {
             let [a, b, c, d] = sequence.point(sample, 0);
@@ -171,8 +172,9 @@ impl Sources<'_> {
         estimate.mean(samples, center.filter(|_| estimate.hidden == 0))
     }
 
-    /// The same for a light without size whose visibility is known. Shadows are exact; the light is approximated as
-    /// constant within each lit piece of the receiver.
+    /// The same for a light without size whose visibility is known. Shadows are exact on a receiver that is a
+    /// parallelogram, and the light is approximated as constant within each of its lit pieces; on another receiver they
+    /// are known at some of its points, and more samples than these are shadow rays.
     fn past_shadows(
         &self,
         index: u32,
@@ -195,12 +197,17 @@ impl Sources<'_> {
             return (mean.x, variance);
         };
         let Some(middle) = point(0.5, 0.5) else { return (0.0, 0.0) };
+        // Points that stand for the receiver are only the first estimate of where a shadow's edge crosses it.
+        if matches!(shape, ReceiverShape::Points(points) if points.len() < sampled.samples as usize) {
+            return self.by_shadow_rays(index, false, sampled, direct);
+        }
         let (mut sum, mut lit, mut pieces) = (0.0, 0.0, PolygonClipper::new());
         let is_exact = origin.lit(shape, shadows, &mut pieces, |place: DVec3, share| {
             sum += share * f64::from(arriving(&Receiver { position: place.as_vec3(), ..middle }));
             lit += share;
         });
         let (hidden, lit) = (u32::from(lit < 1.0 - GAP), (lit as f32).min(1.0));
+        direct.sampled |= !is_exact && hidden > 0 && lit > 0.0;
         direct.seen.add(FIRST_ID + index, u32::from(lit > 0.0), hidden);
         if lit == 0.0 {
             return (0.0, 0.0);
