@@ -290,7 +290,8 @@ fn check_output(asked: &Bake) -> anyhow::Result<()> {
 fn summary(report: &BakeReport) -> String {
     let mut text = format!(
         "{} maps, {} texels ({:.0} % covered), {} patches, {:.1} million rays at {:.2} Mrays/s\n\
-         estimated error {:.2} % of the light around, {:.2} % of the level's mean ({}), {:.1} s on {} threads\n",
+         estimated error {:.2} % of the light around, {:.2} % in the worst room's view, {:.2} % of the level's mean ({}), \
+         {:.1} s on {} threads\n",
         report.maps,
         report.texels,
         100.0 * report.coverage,
@@ -298,6 +299,7 @@ fn summary(report: &BakeReport) -> String {
         report.rays as f64 * 1e-6,
         report.mega_rays_per_second,
         100.0 * report.estimated_error,
+        100.0 * report.error_in_worst_view,
         100.0 * report.error_of_mean,
         report.ended,
         report.seconds,

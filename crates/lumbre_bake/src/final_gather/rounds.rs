@@ -22,7 +22,7 @@ use crate::denoise::{Denoised, Estimates, Neighbourhoods, REPLICATES};
 use crate::direct_light::DirectLight;
 use crate::monitor::{BakeMonitor, Clock};
 use crate::report::StageNotes;
-use crate::sample_allocation::{SampleAllocation, SampleAllocator};
+use crate::sample_allocation::{SampleAllocation, SampleAllocator, WeightedGoal};
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions, Ended, ErrorAtTime};
@@ -39,6 +39,11 @@ const SMALL_STEP_TARGET: f64 = 0.9;
 /// The quality's rays count as spent if those left are less than this fraction of those cast: so few are not worth
 /// another smoothing.
 const MIN_ROUND: f64 = 0.15;
+/// A round that adds a smaller fraction of the rays cast is not worth another smoothing either: while a round needs
+/// fewer, it aims at [`LOWER_TARGET`] of the squared error, down to [`LEAST_TARGET`] of what was requested.
+const WORTHWHILE: f64 = 0.02;
+const LOWER_TARGET: f64 = 0.8;
+const LEAST_TARGET: f64 = 0.1;
 /// A round has stalled if it left more than this fraction of the squared error that it was to reduce.
 const STALLED: f64 = 0.95;
 /// The gather ends after so many stalled rounds in a row. One alone says little: where much of the light comes through
@@ -332,28 +337,36 @@ impl<'a> RoundPlanner<'a> {
             }
             false => (TARGET, budget),
         };
-        let goal = left.goal(target * requested, &self.open);
-        let allocator = SampleAllocator {
-            texels: &self.open,
-            variances: &goal.variances,
-            samples: &samples,
-            most: max_samples,
-            order: CONVERGENCE_ORDER,
+        let allocate = |goal: &WeightedGoal, most: u64| {
+            let variances = &goal.variances;
+            let (texels, samples, order) = (&self.open, &samples, CONVERGENCE_ORDER);
+            let allocator = SampleAllocator { texels, variances, samples, most: max_samples, order };
+            let wanted = allocator.within(most, goal.sum);
+            (allocator.added(&wanted), wanted)
         };
-        let mut wanted = allocator.within(budget, goal.sum);
-        let is_short_of_time = allocator.added(&wanted) > affordable;
+        let worthwhile = (WORTHWHILE * cast as f64) as u64;
+        let mut target = target;
+        let (goal, (mut added, mut wanted)) = loop {
+            let goal = left.goal(target * requested, &self.open);
+            let allocated = allocate(&goal, budget);
+            if allocated.0 >= worthwhile || budget < worthwhile || target < LEAST_TARGET {
+                break (goal, allocated);
+            }
+            target *= LOWER_TARGET;
+        };
+        let is_short_of_time = added > affordable;
         let is_late = is_short_of_time && (affordable as f64) < MIN_ROUND * cast as f64;
         if is_late {
-            wanted = Vec::new();
+            (added, wanted) = (0, Vec::new());
         } else if is_short_of_time {
-            wanted = allocator.within(affordable, goal.sum);
+            (added, wanted) = allocate(&goal, affordable);
         }
         RoundPlan {
             reducible_sum: left.reducible_sum(&goal.weights),
             is_last: (is_spent && !is_small_step) || (wanted.is_empty() && !is_late),
             is_small_step,
             is_late,
-            added: allocator.added(&wanted),
+            added,
             wanted,
             weights: goal.weights,
         }
