@@ -81,8 +81,9 @@ pub struct BakeOptions {
     /// How densely surfaces are covered with texels.
     pub density: Density,
     /// The target: the relative RMSE that sampling may leave in the lightmap; positive. 0.01 is one per cent of the
-    /// light around each texel. The final gather stops when its estimate reaches this, when the time is up, or, except
-    /// in a final bake with a time limit, at the quality's limit of rays.
+    /// light around each texel. The final gather stops when its estimate reaches this, for the whole level and in
+    /// every room's view, when the time is up, or, except in a final bake with a time limit, at the quality's limit of
+    /// rays.
     pub error: f64,
     /// Wall-clock time after which no more samples are taken; `None` for no limit. The map is complete all the same,
     /// only noisier. Its bits then depend on the machine's speed.
