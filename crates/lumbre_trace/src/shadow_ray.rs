@@ -54,7 +54,7 @@ pub(crate) fn transmittance(
     // Set if a surface was passed that transmits part of the light. A ray that is not blocked tests all
     // surfaces on its way.
     let through = Cell::new(false);
-    let hidden = scene.geometry.any_between(ray, distance, |candidate| {
+    let hidden = scene.geometry.blocked_between(ray, distance, |candidate| {
         if bulbs.contains(&candidate.object) {
             return false;
         }

@@ -95,6 +95,10 @@ impl Scene {
             })
             .collect();
         let passable: Vec<Passable> = collected.objects.iter().map(Passable::of).collect();
+        // Glowing objects may be bulbs, which let the light of their lamp pass.
+        let always_blocks =
+            |index: usize| passable[index].passage == Passage::Closed && !collected.objects[index].glows();
+        let geometry = Geometry::build(triangles, &quadrics, always_blocks);
         let is_open = |found: &Passable| matches!(found.passage, Passage::Clear | Passage::Covering);
         Ok(Self {
             see_through: passable.iter().any(is_open),
@@ -102,7 +106,7 @@ impl Scene {
             holes: passable.iter().any(|found| found.passage == Passage::Cut),
             solids: passable.iter().any(|found| found.solid),
             passable,
-            geometry: Geometry::build(triangles, &quadrics),
+            geometry,
             settings: collected.settings,
             origin,
             objects: collected.objects,
