@@ -20,8 +20,10 @@ pub struct Frame {
     /// Whether every lamp that casts shadows moves slightly, alternately to and fro, before each timed frame,
     /// so that no shadow map can be reused.
     pub moving_lamps: bool,
-    /// Whether the frame is timed, or drawn for its picture and its counts only.
+    /// Whether the frame is timed.
     pub is_timed: bool,
+    /// Whether it is drawn for its picture and its counts.
+    pub is_pictured: bool,
     /// Settings that the scene gets before each drawing, so that frames with different settings can share it.
     settings: Option<SceneSettings>,
 }
@@ -40,6 +42,7 @@ impl Frame {
             renderer: None,
             moving_lamps: false,
             is_timed: true,
+            is_pictured: true,
             settings: None,
         }
     }
@@ -64,6 +67,11 @@ impl Frame {
     /// Returns the frame, timed or not.
     pub fn timed(self, is_timed: bool) -> Self {
         Self { is_timed, ..self }
+    }
+
+    /// Returns the frame, drawn for its picture or not.
+    pub fn pictured(self, is_pictured: bool) -> Self {
+        Self { is_pictured, ..self }
     }
 
     /// Returns the frame with these settings of its scene.

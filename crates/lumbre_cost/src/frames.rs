@@ -23,10 +23,11 @@ use crate::{Conditions, CostError, Spread};
 const HAIR: f64 = 1e-4;
 
 /// The measurements of a frame.
+#[derive(Default)]
 pub struct DrawnFrame {
     /// Milliseconds of each round, from the call until the device has finished; empty if it is not timed.
     pub times: Vec<f64>,
-    /// Its picture, in 32-bit floats and without exposure.
+    /// Its picture, in 32-bit floats and without exposure; empty if it is not drawn for its picture.
     pub picture: Picture,
     /// Numbers of vertex and fragment invocations. How often a device shades a vertex that several triangles
     /// share, and whether it counts hidden fragments, depends on the device: `None` if only counts that are
@@ -98,11 +99,21 @@ pub fn draw_in_rounds(
         timed.iter().map(|frame| timed_work(conditions, *frame, &renderers, &timed_target)).collect();
     let mut drawn = while_compiling_ahead(conditions, &frames, |begun| {
         let mut drawn = Vec::new();
-        for number in (0..frames.len()).filter(|number| !frames[*number].is_timed) {
-            begun.begin(number, Drawing::Timed);
+        for (number, frame) in frames.iter().enumerate() {
+            if !frame.is_timed {
+                begun.begin(number, Drawing::Timed);
+            }
+            if !frame.is_pictured {
+                begun.begin(number, Drawing::Picture);
+                begun.begin(number, Drawing::Counted);
+            }
         }
         for (number, frame) in frames.iter().enumerate() {
             conditions.tell(part(0.3 * number as f64 / frames.len() as f64))?;
+            if !frame.is_pictured {
+                drawn.push(DrawnFrame::default());
+                continue;
+            }
             begun.begin(number, Drawing::Picture);
             let mut world = frame.world();
             let mut found = match conditions.as_shown {
@@ -123,7 +134,8 @@ pub fn draw_in_rounds(
         }
         // Frames that were drawn for their pictures are warm, unless they are timed with other pipelines.
         let cold = work.iter_mut().zip(&timed);
-        let cold = cold.filter(|(_, (frame, _))| conditions.as_shown || frame.renderer.is_none());
+        let drawn_so = |frame: &Frame| frame.is_pictured && !conditions.as_shown && frame.renderer.is_some();
+        let cold = cold.filter(|(_, (frame, _))| !drawn_so(frame));
         for (piece, (_, number)) in cold {
             begun.begin(*number, Drawing::Timed);
             warm_up([piece], rounds, &|| conditions.tell(part(0.3)))?;
@@ -343,6 +355,7 @@ mod tests {
                 Frame::of(&world, FrameOptions::default()).sharing("both"),
                 Frame::of(&world, lit).sharing("both"),
                 Frame::new(room(Air::Hazy), FrameOptions::default()).with_moving_lamps(),
+                Frame::of(&world, FrameOptions::default()).sharing("both").pictured(false),
             ];
             draw_frames(&conditions, frames, 0.0, [0.0, 1.0])
         };
@@ -352,6 +365,8 @@ mod tests {
                 assert_eq!(alone.counts(), together.counts());
                 assert_eq!(together.times.len(), 5);
             }
+            let pictured = drawn(None, as_shown)?.into_iter().map(|one| !one.picture.radiance.is_empty());
+            assert_eq!(pictured.collect::<Vec<_>>(), [true, true, true, false]);
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use lumbre_trace::{Metering, compare, shown};
 use crate::{ErrorOf, ErrorOver};
 
 /// Radiance of every pixel.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Picture {
     /// Width in pixels.
     pub width: usize,

@@ -6,6 +6,9 @@
 //!   youngest on top.
 //! - Solids of glass that touch are crossed together, as one interface. The rays that go on are computed in
 //!   `interface`.
+//!
+//! Only parallel surfaces are coplanar. At a joint, such as that of a wall and a box, a ray crosses other faces
+//! within the same neighbourhood, and in any order, so that each query leaves them out itself.
 
 use glam::DVec3;
 
@@ -54,16 +57,14 @@ pub(crate) fn nearest_layers(
     }
     let place = Place::of(ray, &found.point);
     let nearest = |wanted: &dyn Fn(Passage) -> bool| {
-        let hit = scene.geometry.closest(&place.around, 2.0 * place.reach, |candidate| {
-            wanted(scene.passage(candidate.object)) && accept(candidate)
-        });
-        hit.filter(|hit| place.holds(scene, hit)).map(|hit| place.layer(scene, ray, hit))
+        let hit =
+            place.nearest(scene, |candidate| wanted(scene.passage(candidate.object)) && accept(candidate))?;
+        Some(place.layer(scene, ray, hit))
     };
-    let opaque = |passage| matches!(passage, Passage::Closed | Passage::Cut);
     let base = match scene.passage(found.point.object) {
         Passage::Closed | Passage::Cut => Some(found.clone()),
-        Passage::Clear => Some(nearest(&opaque).unwrap_or_else(|| found.clone())),
-        Passage::Covering => nearest(&opaque).or_else(|| nearest(&|passage| passage == Passage::Clear)),
+        Passage::Clear => Some(nearest(&is_opaque).unwrap_or_else(|| found.clone())),
+        Passage::Covering => nearest(&is_opaque).or_else(|| nearest(&|passage| passage == Passage::Clear)),
     };
     // What is on the other side of a base is not over it.
     let covers = |candidate: &Candidate| accept(candidate) && (base.is_none() || scene.is_seen(candidate));
@@ -84,23 +85,55 @@ pub(crate) fn nearest_layers(
     Some(Layers { top, below: layers.collect() })
 }
 
-/// Returns the part of the light of a surface that reaches a viewer past the surfaces that cover it in its own
-/// plane: the product of 1 - alpha. `ray` goes to the surface, whose point lies at a distance; `normal` is a unit
-/// vector to either side of it, and `extent` is its largest coordinate.
-pub(crate) fn uncovered_share(
-    scene: &Scene,
-    ray: &SpaceRay,
-    distance: f64,
-    (normal, extent): (DVec3, f64),
-) -> f64 {
-    let position = ray.at(distance);
-    if !scene.may_be_covered(position) {
-        return 1.0;
+/// The surface that a ray ends on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EndSurface {
+    pub object: usize,
+    /// Unit geometric normal, to either side.
+    pub normal: DVec3,
+    /// Largest coordinate, to which rounding errors are relative.
+    pub extent: f64,
+}
+
+impl EndSurface {
+    /// Returns the part of its light that reaches the start of a ray past the other surfaces in its plane: the
+    /// product of 1 - alpha over those that cover it, and 0 if it is glass with an opaque surface there. `ray`
+    /// goes to the surface, whose point lies at a distance.
+    pub fn uncovered_share(&self, scene: &Scene, ray: &SpaceRay, distance: f64) -> f64 {
+        let may_be_covered = scene.may_be_covered(ray.at(distance));
+        let is_glass = scene.passage(self.object) == Passage::Clear;
+        if !may_be_covered && !is_glass {
+            return 1.0;
+        }
+        let place = self.place(ray, distance);
+        let seen = |candidate: &Candidate| scene.is_seen(candidate);
+        let covers = |candidate: &Candidate| is_opaque(scene.passage(candidate.object)) && seen(candidate);
+        if is_glass && place.nearest(scene, covers).is_some() {
+            return 0.0;
+        }
+        if !may_be_covered {
+            return 1.0;
+        }
+        let coverings = place.coverings(scene, seen);
+        coverings.iter().map(|hit| 1.0 - SurfacePoint::new(scene, &place.around, hit).coverage).product()
     }
-    let towards = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
-    let place = Place::new(position, ray.direction, towards, extent);
-    let coverings = place.coverings(scene, |candidate| scene.is_seen(candidate));
-    coverings.iter().map(|hit| 1.0 - SurfacePoint::new(scene, &place.around, hit).coverage).product()
+
+    /// Returns true if a ray crosses another surface in the plane of this one, of which `position` is a point.
+    pub fn is_coplanar(&self, scene: &Scene, position: DVec3, candidate: &Candidate) -> bool {
+        let (other, normal) = scene.position_and_normal(candidate);
+        let size = self.extent.max(position.abs().max_element());
+        normal.dot(self.normal).abs() >= PARALLEL
+            && (other - position).dot(self.normal).abs() <= TOGETHER * size
+    }
+
+    fn place(&self, ray: &SpaceRay, distance: f64) -> Place {
+        let towards = if self.normal.dot(ray.direction) > 0.0 { -self.normal } else { self.normal };
+        Place::new(ray.at(distance), ray.direction, towards, self.extent)
+    }
+}
+
+fn is_opaque(passage: Passage) -> bool {
+    matches!(passage, Passage::Closed | Passage::Cut)
 }
 
 /// Returns the other solids that have a coplanar surface at a point of a solid: glass that touches glass is
@@ -113,12 +146,12 @@ pub(crate) fn coplanar_solids(
     let mut found: Vec<(usize, bool, f64)> = Vec::new();
     let place = Place::of(ray, point);
     while found.len() < MAX_TOGETHER {
-        let next = scene.geometry.closest(&place.around, 2.0 * place.reach, |candidate| {
+        let next = place.nearest(scene, |candidate| {
             candidate.object != point.object
                 && scene.is_solid(candidate.object)
                 && found.iter().all(|(own, ..)| *own != candidate.object)
         });
-        let Some(hit) = next.filter(|hit| place.holds(scene, hit)) else { break };
+        let Some(hit) = next else { break };
         let extent = SurfacePoint::new(scene, &place.around, &hit).extent;
         // Slightly larger, so that the caller sees that several surfaces were crossed and offsets the
         // transmitted ray by more.
@@ -156,19 +189,15 @@ impl Place {
     /// Returns the hits of the surfaces that `accept` takes and that cover the place in part, the youngest object
     /// first.
     fn coverings(&self, scene: &Scene, accept: impl Fn(&Candidate) -> bool) -> Vec<Hit> {
-        let mut met: Vec<usize> = Vec::new();
-        let mut covering = Vec::new();
-        while met.len() < MAX_TOGETHER {
-            let next = scene.geometry.closest(&self.around, 2.0 * self.reach, |candidate| {
+        let mut covering: Vec<Hit> = Vec::new();
+        while covering.len() < MAX_TOGETHER {
+            let next = self.nearest(scene, |candidate| {
                 scene.passage(candidate.object) == Passage::Covering
-                    && !met.contains(&candidate.object)
+                    && covering.iter().all(|hit| hit.candidate.object != candidate.object)
                     && accept(candidate)
             });
             let Some(hit) = next else { break };
-            met.push(hit.candidate.object);
-            if self.holds(scene, &hit) {
-                covering.push(hit);
-            }
+            covering.push(hit);
         }
         covering.sort_by_key(|hit| std::cmp::Reverse(hit.candidate.object));
         covering
@@ -181,9 +210,16 @@ impl Place {
         Layer { hit, point: SurfacePoint::new(scene, ray, &hit) }
     }
 
-    /// Returns true if the surfaces are parallel. Where the edge of one only touches the other, rays hit them
-    /// one after the other.
-    fn holds(&self, scene: &Scene, hit: &Hit) -> bool {
-        SurfacePoint::new(scene, &self.around, hit).geometric.dot(self.normal) >= PARALLEL
+    /// Returns the nearest of the surfaces that `accept` takes and that are coplanar with the place's.
+    fn nearest(&self, scene: &Scene, accept: impl Fn(&Candidate) -> bool) -> Option<Hit> {
+        scene.geometry.closest(&self.around, 2.0 * self.reach, |candidate| {
+            accept(candidate) && self.is_parallel(scene, candidate)
+        })
+    }
+
+    fn is_parallel(&self, scene: &Scene, candidate: &Candidate) -> bool {
+        let (_, normal) = scene.position_and_normal(candidate);
+        let towards = if normal.dot(self.around.direction) > 0.0 { -normal } else { normal };
+        towards.dot(self.normal) >= PARALLEL
     }
 }

@@ -8,10 +8,11 @@ use lumbre_optics::{
     transmitted_highlight,
 };
 
+use crate::coplanar::EndSurface;
 use crate::geometry::SpaceRay;
 use crate::medium::MediumStack;
 use crate::scene::{PlacedLight, Scene};
-use crate::shadow_ray::{Glass, transmittance};
+use crate::shadow_ray::{Glass, Target, transmittance};
 use crate::surface_point::SurfacePoint;
 
 /// The terms of the sum at one point.
@@ -119,13 +120,13 @@ pub(crate) fn direct_light(
         let visibility = if lighting.shadows {
             let from_behind = sample.direction.dot(point.geometric) < 0.0;
             let start = if from_behind { behind } else { media };
-            let (visible, rays) = transmittance(
-                scene,
-                &shadow_ray(point, sample.direction),
-                reach(placed, point),
-                start,
-                (Glass::LetsThrough, &placed.bulbs),
-            );
+            let target = Target {
+                distance: reach(placed, point),
+                surface: None,
+                glass: Glass::LetsThrough,
+                bulbs: &placed.bulbs,
+            };
+            let (visible, rays) = transmittance(scene, &shadow_ray(point, sample.direction), &target, start);
             light.rays += rays;
             visible
         } else {
@@ -231,6 +232,10 @@ fn polygon_visibility(
 ) -> (DVec3, u32) {
     let light = &scene.polygons[number].light;
     let front = light.area_vector();
+    let corners = [DVec3::ZERO, light.edge_u, light.edge_v].map(|edge| (light.corner + edge).abs());
+    let extent = corners.into_iter().map(DVec3::max_element).fold(0.0, f64::max);
+    let normal = front.normalize_or_zero();
+    let surface = EndSurface { object: scene.polygons[number].emitter, normal, extent };
     let (mut sum, mut weight, mut rays) = (DVec3::ZERO, 0.0, 0);
     for row in 0..SHADOW_POINTS {
         for column in 0..SHADOW_POINTS {
@@ -247,13 +252,8 @@ fn polygon_visibility(
             if !(part > 0.0 && part.is_finite()) {
                 continue;
             }
-            let (visible, more) = transmittance(
-                scene,
-                &shadow_ray(point, to / distance),
-                distance,
-                media,
-                (Glass::LetsThrough, &[]),
-            );
+            let target = Target { distance, surface: Some(surface), glass: Glass::LetsThrough, bulbs: &[] };
+            let (visible, more) = transmittance(scene, &shadow_ray(point, to / distance), &target, media);
             (sum, weight, rays) = (sum + visible * part, weight + part, rays + more);
         }
     }

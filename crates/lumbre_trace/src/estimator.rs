@@ -21,7 +21,7 @@ pub(crate) struct Estimator<'a> {
 
 enum Followed<'a> {
     Trees(RayTree<'a>),
-    Paths(Paths<'a>),
+    Paths(Box<Paths<'a>>),
 }
 
 impl<'a> Estimator<'a> {
@@ -34,7 +34,8 @@ impl<'a> Estimator<'a> {
             }
             Integrator::Path => {
                 let (depth, shadows) = (view.options.depth, view.options.shadows);
-                Followed::Paths(Paths::new(&view.scene, &view.camera, depth, shadows))
+                let paths = Paths::new(&view.scene, &view.camera, depth, shadows);
+                Followed::Paths(Box::new(paths))
             }
         };
         Self { view, aovs, integrator }

@@ -10,7 +10,7 @@
 //!      │ samples, errors         ▼                                        ▼
 //!    tiles, rendering    ray_tree (Whitted)                          path (all light)
 //!                          direct_light ─► shadow_ray                  light_sampling ─► shadow_ray
-//!                          interface: mirror, Snell, Fresnel           lobe_sampling, interface
+//!                          interface: mirror, Snell, Fresnel           lamp_cone, lobe_sampling, interface
 //!                          medium: the media around a ray              medium
 //!                          branch: the recorded tree
 //! ```
@@ -62,6 +62,7 @@ pub mod flip;
 mod geometry;
 mod heat;
 mod interface;
+mod lamp_cone;
 mod light_aovs;
 mod light_sampling;
 mod light_terms;

@@ -1,16 +1,20 @@
 //! Light sampling for paths: chooses one lamp in proportion to its unoccluded light at a surface point, and
 //! one point on the emissive triangles, of which `emitter_tree` chooses one. Visibility is not tested here.
 //! Where there are many lamps, `light_tree` first selects the few that are weighed one by one.
-
-use std::f64::consts::PI;
+//!
+//! What is sampled has a density, so that paths can weigh it against finding the same light by themselves: the
+//! emissive triangles that they hit, and the lamps with a size that lie along their rays.
 
 use glam::{DVec2, DVec3};
-use lumbre_optics::{LightKind, LightSample, evaluate_light};
+use lumbre_optics::{Light, LightKind, LightSample, evaluate_light};
 use lumbre_scene::EmissiveLight;
+use smallvec::SmallVec;
 
+use crate::coplanar::EndSurface;
+use crate::direct_light::reach;
 use crate::emitter_tree::{EmitterBounds, EmitterTree};
+use crate::lamp_cone::LampCone;
 use crate::light_tree::LightTree;
-use crate::lobe_sampling::within_cone;
 use crate::metering::luminance;
 use crate::scene::{Object, Passage, Scene, sample_color};
 use crate::surface_point::SurfacePoint;
@@ -23,6 +27,8 @@ pub(crate) struct LightSampler {
     emitter_tree: EmitterTree,
     /// Indices of all lights, which are weighed one by one if there is no tree.
     lamps: Vec<usize>,
+    /// Indices of the lights that have a size, which rays may find.
+    sized: Vec<usize>,
     /// Selects a few lamps where there are more than [`FEW_LAMPS`].
     tree: Option<LightTree>,
     /// Index of the emitter that each triangle of the scene is, by the triangle's index, or [`NO_EMITTER`];
@@ -53,13 +59,29 @@ pub(crate) struct LampSample {
     pub chance: f64,
     /// Metres; infinite for distant lights.
     pub distance: f64,
+    /// The solid angle of the lamp, over which directions are uniform, sr; 0 for lamps without a size.
+    pub solid_angle: f64,
 }
+
+/// A lamp with a size that a ray meets.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MetLamp {
+    /// Index of the light in the scene.
+    pub number: usize,
+    /// Radiance for the diffuse and for the specular lobe of the surface that reflects it.
+    pub radiance: [DVec3; 2],
+    /// Metres to its surface; infinite for distant lights.
+    pub distance: f64,
+    /// Steradians, as seen from the start of the ray.
+    pub solid_angle: f64,
+}
+
+/// Lamps with their light at a point and the weights by which one of them is chosen, and the sum of the weights.
+type WeighedLamps = (SmallVec<[(usize, LightSample, f64); 32]>, f64);
 
 /// A point on an emissive triangle, sampled for a surface point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EmitterSample {
-    /// The object that the triangle belongs to.
-    pub object: usize,
     /// Radiance towards the surface.
     pub radiance: DVec3,
     /// Unit vector towards the light.
@@ -67,8 +89,8 @@ pub(crate) struct EmitterSample {
     pub distance: f64,
     /// Probability density per steradian.
     pub density: f64,
-    /// Unit normal of the emissive triangle and its largest coordinate, to which rounding errors are relative.
-    pub surface: (DVec3, f64),
+    /// The emissive triangle.
+    pub surface: EndSurface,
 }
 
 /// Marks triangles that emit nothing.
@@ -81,8 +103,6 @@ const MIN_TINT: f64 = 0.1;
 /// Lower bound of the cosine with which a lamp with a size is weighed: part of it may be above the horizon
 /// where its centre is not.
 const SIZED_FLOOR: f64 = 0.1;
-/// Upper bound of the sine of the half angle that a spherical lamp fills.
-const LARGEST_SINE: f64 = 0.99;
 
 impl LightSampler {
     pub fn new(scene: &Scene) -> Self {
@@ -121,9 +141,10 @@ impl LightSampler {
             }
         }
         let emitter_tree = EmitterTree::new(&bounds);
-        let lamps = (0..scene.lights.len()).collect();
+        let lamps: Vec<usize> = (0..scene.lights.len()).collect();
+        let sized = lamps.iter().copied().filter(|&number| has_size(&scene.lights[number].light)).collect();
         let tree = (scene.lights.len() > FEW_LAMPS).then(|| LightTree::new(scene));
-        Self { emitters, emitter_tree, emitter_of, lamps, tree }
+        Self { emitters, emitter_tree, emitter_of, lamps, sized, tree }
     }
 
     /// Samples a lamp for a point, and a direction towards it; `None` if no lamp sends light there.
@@ -138,27 +159,7 @@ impl LightSampler {
             Some(tree) => tree.few(scene, point.position, point.normal, choice)?,
             None => (&self.lamps[..], 1.0, choice),
         };
-        let mut weights = smallvec::SmallVec::<[(usize, LightSample, f64); 32]>::new();
-        let mut total = 0.0;
-        for &number in asked {
-            let placed = &scene.lights[number];
-            let light = &placed.light;
-            if light.kind == LightKind::Ambient {
-                continue;
-            }
-            let sample = evaluate_light(light, placed.position, placed.axis, point.position);
-            let sized = match light.kind {
-                LightKind::Point => light.radius > 0.0,
-                LightKind::Directional | LightKind::Ambient => light.angle > 0.0,
-            };
-            let cosine = point.normal.dot(sample.direction).max(if sized { SIZED_FLOOR } else { 0.0 });
-            let color = luminance(sample.diffuse) + luminance(sample.specular);
-            let weight = color * sample.attenuation * sample.spot * cosine;
-            if weight > 0.0 && weight.is_finite() {
-                total += weight;
-                weights.push((number, sample, weight));
-            }
-        }
+        let (weights, total) = weighed(scene, asked, point.position, point.normal);
         let mut left = choice * total;
         let last = weights.len().checked_sub(1)?;
         let (number, sample, weight) = weights.into_iter().enumerate().find_map(|(place, found)| {
@@ -166,17 +167,52 @@ impl LightSampler {
             (left < 0.0 || place == last).then_some(found)
         })?;
         let placed = &scene.lights[number];
-        let (light, distance) = match placed.light.kind {
-            LightKind::Point => {
-                let distance = placed.position.distance(point.position);
-                on_sphere_lamp(sample, f64::from(placed.light.radius), distance, numbers)
-            }
-            LightKind::Directional | LightKind::Ambient => {
-                let half = 0.5 * f64::from(placed.light.angle);
-                (on_disc_of_sky(sample, half, numbers), f64::INFINITY)
-            }
+        let chance = of_asked * weight / total;
+        let Some(cone) = LampCone::new(placed, point.position) else {
+            return Some(LampSample {
+                number,
+                light: sample,
+                chance,
+                distance: reach(placed, point),
+                solid_angle: 0.0,
+            });
         };
-        Some(LampSample { number, light, chance: of_asked * weight / total, distance })
+        let direction = cone.sample(numbers);
+        Some(LampSample {
+            number,
+            light: cone.spread(sample, direction),
+            chance,
+            distance: cone.reach(direction),
+            solid_angle: cone.solid_angle(),
+        })
+    }
+
+    /// Returns the probability with which [`lamp`](Self::lamp) chooses a lamp for a point.
+    pub fn lamp_chance(&self, scene: &Scene, point: &SurfacePoint, lamp: usize) -> f64 {
+        let (position, normal) = (point.position, point.normal);
+        let asked = match &self.tree {
+            Some(tree) => tree.few_with(scene, lamp, position, normal),
+            None => Some((&self.lamps[..], 1.0)),
+        };
+        let Some((asked, of_asked)) = asked else { return 0.0 };
+        let (weights, total) = weighed(scene, asked, position, normal);
+        let own = weights.iter().find(|(number, ..)| *number == lamp);
+        own.map_or(0.0, |(_, _, weight)| of_asked * weight / total)
+    }
+
+    /// Returns the lamps with a size that lie along a ray, whatever is in front of them.
+    pub fn met(&self, scene: &Scene, origin: DVec3, direction: DVec3) -> SmallVec<[MetLamp; 2]> {
+        let met = |&number: &usize| {
+            let placed = &scene.lights[number];
+            let cone = LampCone::new(placed, origin).filter(|cone| cone.holds(direction))?;
+            let sample = evaluate_light(&placed.light, placed.position, placed.axis, origin);
+            let strength = sample.attenuation * sample.spot * cone.concentration();
+            let radiance = [sample.diffuse, sample.specular].map(|color| color * strength);
+            let is_finite = radiance.iter().all(|color| color.is_finite());
+            let (distance, solid_angle) = (cone.reach(direction), cone.solid_angle());
+            (strength > 0.0 && is_finite).then_some(MetLamp { number, radiance, distance, solid_angle })
+        };
+        self.sized.iter().filter_map(met).collect()
     }
 
     /// Samples a point on the emissive triangles for a surface point; `None` where the triangle's side emits
@@ -206,12 +242,11 @@ impl LightSampler {
         let density = chance / emitter.area * distance * distance / cosine.abs();
         let extent = emitter.corners.iter().fold(0.0_f64, |extent, at| extent.max(at.abs().max_element()));
         (radiance != DVec3::ZERO && density.is_finite() && density > 0.0).then_some(EmitterSample {
-            object: emitter.object,
             radiance,
             direction,
             distance,
             density,
-            surface: (emitter.normal, extent),
+            surface: EndSurface { object: emitter.object, normal: emitter.normal, extent },
         })
     }
 
@@ -246,32 +281,98 @@ fn tint(object: &Object, number: u32, weights: [f64; 2]) -> DVec3 {
     sample_color(texture, object.coordinates(texture.tex_coord, vertices, weights)).truncate()
 }
 
-/// Samples a spherical lamp of uniform radiance: a direction within the cone that it fills, weighted so that
-/// the mean over all directions is the light of a lamp at its centre. The distance returned ends on the
-/// sphere.
-fn on_sphere_lamp(sample: LightSample, radius: f64, distance: f64, numbers: DVec2) -> (LightSample, f64) {
-    let sine = (radius / distance.max(f64::MIN_POSITIVE)).clamp(0.0, LARGEST_SINE);
-    if sine == 0.0 {
-        return (sample, distance);
+/// Weighs lamps by their unoccluded light at a point with a normal. Those that send none are left out.
+fn weighed(scene: &Scene, lamps: &[usize], point: DVec3, normal: DVec3) -> WeighedLamps {
+    let mut weights = SmallVec::new();
+    let mut total = 0.0;
+    for &number in lamps {
+        let placed = &scene.lights[number];
+        if placed.light.kind == LightKind::Ambient {
+            continue;
+        }
+        let sample = evaluate_light(&placed.light, placed.position, placed.axis, point);
+        let lowest = if has_size(&placed.light) { SIZED_FLOOR } else { 0.0 };
+        let cosine = normal.dot(sample.direction).max(lowest);
+        let color = luminance(sample.diffuse) + luminance(sample.specular);
+        let weight = color * sample.attenuation * sample.spot * cosine;
+        if weight > 0.0 && weight.is_finite() {
+            total += weight;
+            weights.push((number, sample, weight));
+        }
     }
-    let cosine = ((1.0 - sine) * (1.0 + sine)).sqrt();
-    let direction = within_cone(sample.direction, cosine, numbers);
-    let along = direction.dot(sample.direction);
-    let inner = (radius * radius - distance * distance * (1.0 - along) * (1.0 + along)).max(0.0).sqrt();
-    let reach = (distance * along - inner).max(0.0);
-    (spread(sample, direction, cosine), reach)
+    (weights, total)
 }
 
-/// Samples a distant light that is a disc on the sky.
-fn on_disc_of_sky(sample: LightSample, half_angle: f64, numbers: DVec2) -> LightSample {
-    if half_angle <= 0.0 {
-        return sample;
+fn has_size(light: &Light) -> bool {
+    match light.kind {
+        LightKind::Point => light.radius > 0.0,
+        LightKind::Directional => light.angle > 0.0,
+        LightKind::Ambient => false,
     }
-    let cosine = half_angle.min(0.5 * PI).cos();
-    spread(sample, within_cone(sample.direction, cosine, numbers), cosine)
 }
 
-/// Makes up for the cosine: its mean over a cone is (1 + cos)/2 times that of the cone's axis.
-fn spread(sample: LightSample, direction: DVec3, cosine: f64) -> LightSample {
-    LightSample { direction, attenuation: sample.attenuation * 2.0 / (1.0 + cosine), ..sample }
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use bevy_ecs::world::World;
+    use glam::Vec3;
+    use lumbre_mesh::shapes;
+    use lumbre_optics::Material;
+    use lumbre_scene::{Mesh, Transform, update_transforms};
+
+    use super::*;
+    use crate::geometry::SpaceRay;
+    use crate::random::Numbers;
+
+    /// Lamps of every kind over a floor, with and without a size, so many that there is a tree if `count` is large.
+    fn lamps(count: u32) -> Scene {
+        let mut numbers = Numbers::new(11, 0, 0);
+        let mut world = World::new();
+        world.spawn((Mesh(Arc::new(shapes::plane(9.0, 9.0, 1, 1))), Material::matt(Vec3::ONE)));
+        for number in 0..count {
+            let place = DVec3::new(numbers.next(), numbers.next(), numbers.next());
+            let color = Vec3::splat(numbers.next() as f32);
+            let (radius, angle) = (0.2 * (number % 3) as f32, 0.3 * (number % 2) as f32);
+            let light = if number % 9 == 0 { Light::directional(color) } else { Light::point(color) };
+            let at = Transform::from_translation(8.0 * place - DVec3::new(4.0, -0.1, 4.0));
+            world.spawn((Light { radius, angle, ..light }, at.looking_at(DVec3::ZERO, DVec3::X)));
+        }
+        update_transforms(&mut world);
+        Scene::new(&mut world, DVec3::ZERO, None, [false; 2]).expect("the world can be read")
+    }
+
+    #[test]
+    fn a_lamps_probability_is_that_of_its_choice() {
+        for count in [12, 200] {
+            let scene = lamps(count);
+            let sampler = LightSampler::new(&scene);
+            assert_eq!(sampler.tree.is_some(), count > FEW_LAMPS as u32);
+            let mut numbers = Numbers::new(5, 0, 1);
+            let mut sized = 0;
+            for _ in 0..300 {
+                let from = DVec3::new(8.0 * numbers.next() - 4.0, 1.0, 8.0 * numbers.next() - 4.0);
+                let ray = SpaceRay::new(from, DVec3::NEG_Y);
+                let hit = scene.geometry.closest(&ray, 9.0, |_| true).expect("the floor");
+                let point = SurfacePoint::new(&scene, &ray, &hit);
+                let Some(lamp) = sampler.lamp(&scene, &point, numbers.next(), numbers.pair()) else {
+                    continue;
+                };
+                let chance = sampler.lamp_chance(&scene, &point, lamp.number);
+                assert!((chance - lamp.chance).abs() <= 1e-12 * chance, "{chance} for {}", lamp.chance);
+                let sum: f64 =
+                    (0..count as usize).map(|lamp| sampler.lamp_chance(&scene, &point, lamp)).sum();
+                assert!((0.0..=1.0 + 1e-9).contains(&sum), "{sum}");
+                // The sampled direction finds the lamp, at the same distance and with the same solid angle.
+                if lamp.solid_angle > 0.0 {
+                    sized += 1;
+                    let met = sampler.met(&scene, point.position, lamp.light.direction);
+                    let own = met.iter().find(|met| met.number == lamp.number);
+                    let own = own.expect("the direction is in the lamp's cone");
+                    assert!(own.distance == lamp.distance && own.solid_angle == lamp.solid_angle);
+                }
+            }
+            assert!(sized > 50, "{sized}");
+        }
+    }
 }

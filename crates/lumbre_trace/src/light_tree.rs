@@ -37,14 +37,10 @@ struct LightBox {
     reach: f64,
     /// Whether any lamp has a size, and may be seen above a horizon that hides its centre.
     sized: bool,
-    inside: Inside,
-}
-
-#[derive(Debug)]
-enum Inside {
-    Boxes([usize; 2]),
-    /// Range of [`LightTree::lamps`].
-    Lamps(Range<usize>),
+    /// Its lamps, in [`LightTree::lamps`].
+    lamps: Range<usize>,
+    /// The two boxes within it; `None` for a leaf.
+    inside: Option<[usize; 2]>,
 }
 
 /// Largest number of lamps in a leaf.
@@ -80,30 +76,54 @@ impl LightTree {
         normal: DVec3,
         mut choice: f64,
     ) -> Option<(&[usize], f64, f64)> {
-        let root = self.boxes.len().checked_sub(1);
-        let near = root.map_or(0.0, |root| self.boxes[root].brings(point, normal));
-        let far: f64 = self.distant.iter().map(|number| brightness(&scene.lights[*number].light)).sum();
-        if near + far <= 0.0 {
-            return None;
-        }
         let mut chance = 1.0;
-        if take(&mut choice, &mut chance, far / (near + far)) {
+        if take(&mut choice, &mut chance, self.share_of_distant(scene, point, normal)?) {
             return Some((&self.distant, chance, choice));
         }
-        let mut at = root?;
-        loop {
-            match &self.boxes[at].inside {
-                Inside::Lamps(range) => return Some((&self.lamps[range.clone()], chance, choice)),
-                Inside::Boxes(next) => {
-                    let [first, second] = next.map(|next| self.boxes[next].brings(point, normal));
-                    if first + second <= 0.0 {
-                        return None;
-                    }
-                    let into_first = take(&mut choice, &mut chance, first / (first + second));
-                    at = next[usize::from(!into_first)];
-                }
-            }
+        let mut at = self.boxes.len().checked_sub(1)?;
+        while let Some(next) = self.boxes[at].inside {
+            let into_first = take(&mut choice, &mut chance, self.share_of_first(next, point, normal)?);
+            at = next[usize::from(!into_first)];
         }
+        Some((&self.lamps[self.boxes[at].lamps.clone()], chance, choice))
+    }
+
+    /// Returns the lamps among which [`few`](Self::few) selects a lamp, and the probability of that; `None` where
+    /// it never does.
+    pub fn few_with(
+        &self,
+        scene: &Scene,
+        lamp: usize,
+        point: DVec3,
+        normal: DVec3,
+    ) -> Option<(&[usize], f64)> {
+        let distant = self.share_of_distant(scene, point, normal)?;
+        if self.distant.contains(&lamp) {
+            return Some((&self.distant, distant));
+        }
+        let place = self.lamps.iter().position(|&own| own == lamp)?;
+        let mut chance = 1.0 - distant;
+        let mut at = self.boxes.len().checked_sub(1)?;
+        while let Some(next) = self.boxes[at].inside {
+            let first = self.share_of_first(next, point, normal)?;
+            let in_first = self.boxes[next[0]].lamps.contains(&place);
+            chance *= if in_first { first } else { 1.0 - first };
+            at = next[usize::from(!in_first)];
+        }
+        Some((&self.lamps[self.boxes[at].lamps.clone()], chance))
+    }
+
+    /// Returns the probability of the distant lights; `None` where no light arrives at all.
+    fn share_of_distant(&self, scene: &Scene, point: DVec3, normal: DVec3) -> Option<f64> {
+        let near = self.boxes.last().map_or(0.0, |root| root.brings(point, normal));
+        let far: f64 = self.distant.iter().map(|number| brightness(&scene.lights[*number].light)).sum();
+        (near + far > 0.0).then(|| far / (near + far))
+    }
+
+    /// Returns the probability of the first of two boxes; `None` where neither brings light.
+    fn share_of_first(&self, boxes: [usize; 2], point: DVec3, normal: DVec3) -> Option<f64> {
+        let [first, second] = boxes.map(|own| self.boxes[own].brings(point, normal));
+        (first + second > 0.0).then(|| first / (first + second))
     }
 
     /// Adds the box around `lamps`, which begin at index `first` of the whole list, and all boxes within it.
@@ -113,14 +133,14 @@ impl LightTree {
         let low = lamps.iter().map(place).fold(DVec3::INFINITY, DVec3::min);
         let high = lamps.iter().map(place).fold(DVec3::NEG_INFINITY, DVec3::max);
         let inside = if lamps.len() <= FEW {
-            Inside::Lamps(first..first + lamps.len())
+            None
         } else {
             let size = high - low;
             let axis = (0..3).max_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(0);
             lamps.sort_by(|a, b| place(a)[axis].total_cmp(&place(b)[axis]));
             let half = lamps.len() / 2;
             let (left, right) = lamps.split_at_mut(half);
-            Inside::Boxes([self.add(scene, left, first), self.add(scene, right, first + half)])
+            Some([self.add(scene, left, first), self.add(scene, right, first + half)])
         };
         let lights = || lamps.iter().map(|number| &scene.lights[*number].light);
         let brightest = lights().max_by(|a, b| brightness(a).total_cmp(&brightness(b)));
@@ -132,6 +152,7 @@ impl LightTree {
             attenuation: Attenuation { range: f32::INFINITY, ..attenuation },
             reach: lights().map(|light| f64::from(light.attenuation.range)).fold(0.0, f64::max),
             sized: lights().any(|light| light.radius > 0.0),
+            lamps: first..first + lamps.len(),
             inside,
         });
         self.boxes.len() - 1

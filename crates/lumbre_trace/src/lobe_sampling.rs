@@ -140,14 +140,23 @@ impl Lobes {
     /// Returns the bidirectional reflectance times the cosine, linear RGB, 1/sr: the lighting equation for a
     /// light of unit irradiance.
     pub fn reflectance(&self, direction: DVec3) -> DVec3 {
-        self.reflected(&LightSample {
+        let [diffuse, specular] = self.reflectances(direction);
+        diffuse + specular
+    }
+
+    /// Returns the parts of the [`reflectance`](Self::reflectance) by the diffuse and by the specular lobe.
+    pub fn reflectances(&self, direction: DVec3) -> [DVec3; 2] {
+        let light = LightSample {
             diffuse: DVec3::splat(1.0 / PI),
             specular: DVec3::splat(1.0 / PI),
             direction,
             attenuation: 1.0,
             spot: 1.0,
             ..LightSample::DARK
-        })
+        };
+        let Contribution { diffuse, specular, .. } =
+            light_contribution(self.model, self.surface, &light, self.normal, self.viewer);
+        [diffuse, specular]
     }
 
     /// Returns the diffuse and specular reflection of a light.

@@ -3,25 +3,27 @@
 //! strategies are combined by the balance heuristic (Veach and Guibas 1995), and long paths end by Russian
 //! roulette. Nothing is left out or clamped, so that the mean over many paths converges to the light.
 //!
-//! Not found: the light of lamps, with or without a size, through glass that refracts. Such caustics would
-//! need paths that start at the lamp. Emissive triangles and the sky are found through glass.
+//! Lamps are lights and not surfaces: the eye does not see them, neither directly nor in mirrors nor through
+//! glass, as in frames. Lamps with a size light what a mirror or glass lies in between by the paths that meet
+//! them. Not found: the light of lamps without a size through glass that refracts, and by mirrors. Such caustics
+//! would need paths that start at the lamp.
 
 use glam::{DVec2, DVec3};
 use lumbre_optics::{apply_fog, fog_weight};
 
 use crate::camera_ray::{CameraRay, CameraRays};
-use crate::coplanar::{Layer, nearest_layers, uncovered_share};
+use crate::coplanar::{Layer, nearest_layers};
 use crate::direct_light::shadow_ray;
 use crate::film::Sample;
 use crate::geometry::{Place, SpaceRay};
 use crate::interface::RaySplit;
-use crate::light_sampling::{LightSampler, emitted};
+use crate::light_sampling::{LightSampler, MetLamp, emitted};
 use crate::light_terms::{LightTerms, Source};
 use crate::lobe_sampling::Lobes;
 use crate::medium::MediumStack;
 use crate::random::Numbers;
 use crate::scene::Scene;
-use crate::shadow_ray::{Glass, transmittance};
+use crate::shadow_ray::{Glass, Target, transmittance};
 use crate::surface_point::SurfacePoint;
 
 /// Traces the paths of a picture.
@@ -61,6 +63,9 @@ struct Walk {
     /// The last point at which a direction was sampled; `None` after the camera, a mirror or glass, whose
     /// directions are not sampled.
     last: Option<Scattering>,
+    /// The specular lobe's share of the last reflection by lobes, per channel, since lamps may have a colour of
+    /// their own for it. `None` while the path has only met mirrors and glass.
+    shine: Option<DVec3>,
     reflections: u32,
     rays: u32,
     fog: FogBegins,
@@ -120,6 +125,7 @@ impl<'a> Paths<'a> {
             radiance: DVec3::ZERO,
             terms,
             last: None,
+            shine: None,
             reflections: 0,
             rays: 0,
             fog: FogBegins::AtTheEye,
@@ -217,7 +223,10 @@ impl<'a> Paths<'a> {
         if matt {
             self.sample_lights(walk, point, &lobes, last, numbers);
         }
-        if last {
+        // Light that goes straight through a thin sheet is not turned. Light sampling sees through sheets, and so must
+        // what it is weighed against.
+        let only_straight = last && walk.last.is_some() && object.medium.thin;
+        if last && !only_straight {
             return Next::Ends;
         }
         let splits = object.mirror() != DVec3::ZERO || object.transmission() != DVec3::ZERO;
@@ -226,6 +235,7 @@ impl<'a> Paths<'a> {
         let (mirrored, through) =
             split.as_ref().map_or((0.0, 0.0), |found| (mean(found.mirrored), mean(found.transmitted)));
         let local = if matt { lobes.albedo().max(1e-3) } else { 0.0 };
+        let (local, mirrored) = if only_straight { (0.0, 0.0) } else { (local, mirrored) };
         let total = local + mirrored + through;
         if total <= 0.0 {
             return Next::Ends;
@@ -234,7 +244,9 @@ impl<'a> Paths<'a> {
         if let Some(split) = split.filter(|_| choice >= local) {
             return if choice < local + mirrored {
                 walk.throughput *= split.mirrored * (total / mirrored);
-                walk.turns(split.mirrored_ray(point), None, numbers)
+                let ray = split.mirrored_ray(point);
+                self.meet_lamps(walk, &ray, |_| 1.0);
+                walk.turns(ray, None, numbers)
             } else {
                 walk.throughput *= split.transmitted * (total / through);
                 if object.medium.thin {
@@ -248,7 +260,9 @@ impl<'a> Paths<'a> {
                 walk.throughput /= scale;
                 walk.eta_scale *= scale;
                 walk.media = split.behind.clone();
-                walk.turns(split.transmitted_ray(point), None, numbers)
+                let ray = split.transmitted_ray(point);
+                self.meet_lamps(walk, &ray, |_| 1.0);
+                walk.turns(ray, None, numbers)
             };
         }
         let direction = lobes.direction(numbers.next(), numbers.pair());
@@ -256,13 +270,37 @@ impl<'a> Paths<'a> {
         if direction.dot(point.geometric) <= 0.0 || density <= 0.0 {
             return Next::Ends;
         }
-        walk.throughput *= lobes.reflectance(direction) * (total / (local * density));
+        let [diffuse, specular] = lobes.reflectances(direction);
+        let reflectance = diffuse + specular;
+        walk.throughput *= reflectance * (total / (local * density));
+        let share = specular / reflectance;
+        walk.shine = Some(DVec3::select(reflectance.cmpgt(DVec3::ZERO), share, DVec3::ZERO));
         // The density that the balance heuristic compares: the probability of choosing the lobes at all,
         // times their density.
         let chance = density * local / total;
         let scattering =
             Scattering { position: point.position, normal: point.normal, density: chance, distance: 0.0 };
-        walk.turns(shadow_ray(point, direction), Some(scattering), numbers)
+        let ray = shadow_ray(point, direction);
+        self.meet_lamps(walk, &ray, |lamp| {
+            let by_lights = self.lights.lamp_chance(scene, point, lamp.number) / lamp.solid_angle;
+            chance / (chance + by_lights)
+        });
+        walk.turns(ray, Some(scattering), numbers)
+    }
+
+    /// Adds the light of the lamps with a size that lie along a path's next ray, and that nothing but thin sheets
+    /// and partly covering surfaces hides. `share` is the weight of this way to find a lamp.
+    fn meet_lamps(&self, walk: &mut Walk, ray: &SpaceRay, share: impl Fn(&MetLamp) -> f64) {
+        // Without shadows, sampled lamps shine through everything.
+        let Some(shine) = walk.shine.filter(|_| self.shadows) else { return };
+        for lamp in self.lights.met(self.scene, ray.origin, ray.direction) {
+            let [diffuse, specular] = lamp.radiance;
+            let light = (diffuse + (specular - diffuse) * shine) * share(&lamp);
+            let bulbs = &self.scene.lights[lamp.number].bulbs;
+            let target = Target { distance: lamp.distance, surface: None, glass: Glass::OnlySheets, bulbs };
+            let arriving = self.arriving(walk, ray, &target, light);
+            walk.brings(Source::Light(lamp.number), walk.reflections + 1, arriving);
+        }
     }
 
     /// Next-event estimation: adds the light of one sampled lamp and of one sampled emissive triangle.
@@ -276,23 +314,38 @@ impl<'a> Paths<'a> {
     ) {
         let (choice, place) =
             if self.scene.lights.is_empty() { (0.0, DVec2::ZERO) } else { (numbers.next(), numbers.pair()) };
-        if let Some(lamp) = self.lights.lamp(self.scene, point, choice, place) {
-            let reflected = lobes.reflected(&lamp.light) / lamp.chance;
+        // The density with which the path finds the same light by itself; a path that ends here does not.
+        let found = |walk: &Walk, direction: DVec3| match last {
+            true => 0.0,
+            false => self.chance(walk, point, lobes, direction),
+        };
+        let is_above = |direction: DVec3| direction.dot(point.geometric) > 0.0;
+        let lamp = self.lights.lamp(self.scene, point, choice, place);
+        if let Some(lamp) = lamp.filter(|lamp| is_above(lamp.light.direction)) {
+            let direction = lamp.light.direction;
+            let mut reflected = lobes.reflected(&lamp.light) / lamp.chance;
+            if lamp.solid_angle > 0.0 && self.shadows {
+                reflected /= 1.0 + found(walk, direction) * lamp.solid_angle / lamp.chance;
+            }
             let bulbs = &self.scene.lights[lamp.number].bulbs;
-            let seen = self.seen(walk, point, (lamp.light.direction, lamp.distance, bulbs), reflected);
+            let target = Target { distance: lamp.distance, surface: None, glass: Glass::OnlySheets, bulbs };
+            let seen = self.arriving(walk, &shadow_ray(point, direction), &target, reflected);
             walk.brings(Source::Light(lamp.number), walk.reflections + 1, seen);
         }
         let (choice, place) = (numbers.next(), numbers.pair());
-        if let Some(sample) = self.lights.emitter(self.scene, point, choice, place) {
-            // A path that ends here cannot hit the emitter itself.
-            let found = if last { 0.0 } else { self.chance(walk, point, lobes, sample.direction) };
-            let reflected = lobes.reflectance(sample.direction) * sample.radiance / (sample.density + found);
-            let mut seen = self.seen(walk, point, (sample.direction, sample.distance, &[]), reflected);
-            if self.shadows && seen != DVec3::ZERO {
-                let ray = shadow_ray(point, sample.direction);
-                seen *= uncovered_share(self.scene, &ray, sample.distance, sample.surface);
-            }
-            walk.brings(Source::Object(sample.object), walk.reflections + 1, seen);
+        let emitter = self.lights.emitter(self.scene, point, choice, place);
+        if let Some(sample) = emitter.filter(|sample| is_above(sample.direction)) {
+            let direction = sample.direction;
+            let density = sample.density + found(walk, direction);
+            let reflected = lobes.reflectance(direction) * sample.radiance / density;
+            let target = Target {
+                distance: sample.distance,
+                surface: Some(sample.surface),
+                glass: Glass::OnlySheets,
+                bulbs: &[],
+            };
+            let seen = self.arriving(walk, &shadow_ray(point, direction), &target, reflected);
+            walk.brings(Source::Object(sample.surface.object), walk.reflections + 1, seen);
         }
     }
 
@@ -308,25 +361,20 @@ impl<'a> Paths<'a> {
         lobes.density(direction) * local / total
     }
 
-    /// Returns how much of a sampled light arrives at the point; 0 from below the geometric horizon.
-    fn seen(
-        &self,
-        walk: &mut Walk,
-        point: &SurfacePoint,
-        (direction, distance, bulbs): (DVec3, f64, &[usize]),
-        light: DVec3,
-    ) -> DVec3 {
-        if light == DVec3::ZERO || direction.dot(point.geometric) <= 0.0 {
-            return DVec3::ZERO;
-        }
-        if !self.shadows {
+    /// Returns how much of a light arrives at the start of a ray towards it.
+    fn arriving(&self, walk: &mut Walk, ray: &SpaceRay, target: &Target, light: DVec3) -> DVec3 {
+        if light == DVec3::ZERO || !self.shadows {
             return light;
         }
-        let ray = shadow_ray(point, direction);
-        let (visible, rays) =
-            transmittance(self.scene, &ray, distance, &walk.media, (Glass::OnlySheets, bulbs));
+        let (visible, rays) = transmittance(self.scene, ray, target, &walk.media);
         walk.rays += rays;
-        light * visible
+        let arriving = light * visible;
+        match target.surface {
+            Some(surface) if arriving != DVec3::ZERO => {
+                arriving * surface.uncovered_share(self.scene, ray, target.distance)
+            }
+            _ => arriving,
+        }
     }
 }
 
@@ -421,6 +469,7 @@ mod tests {
                     radiance: DVec3::ZERO,
                     terms: LightTerms::new(false),
                     last: None,
+                    shine: None,
                     reflections: SAFE_DEPTH,
                     rays: 0,
                     fog: FogBegins::Before(0.0),

@@ -11,7 +11,7 @@ use crate::direct_light::{reach, shadow_ray};
 use crate::geometry::SpaceRay;
 use crate::medium::MediumStack;
 use crate::scene::Scene;
-use crate::shadow_ray::{Glass, transmittance};
+use crate::shadow_ray::{Glass, Target, transmittance};
 use crate::surface_point::SurfacePoint;
 use crate::view::{View, pixel_middle};
 
@@ -75,8 +75,9 @@ struct Shadow<'a> {
 
 impl Shadow<'_> {
     fn is_hidden(&self, scene: &Scene) -> bool {
-        let asked = (Glass::LetsThrough, self.bulbs);
-        transmittance(scene, &self.ray, self.distance, self.media, asked).0.max_element() <= 0.0
+        let target =
+            Target { distance: self.distance, surface: None, glass: Glass::LetsThrough, bulbs: self.bulbs };
+        transmittance(scene, &self.ray, &target, self.media).0.max_element() <= 0.0
     }
 }
 

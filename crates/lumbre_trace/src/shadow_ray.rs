@@ -6,8 +6,8 @@ use std::cell::Cell;
 
 use glam::DVec3;
 
-use crate::coplanar::{Layer, Layers, nearest_layers};
-use crate::geometry::SpaceRay;
+use crate::coplanar::{EndSurface, Layer, Layers, nearest_layers};
+use crate::geometry::{Candidate, SpaceRay};
 use crate::interface::reflected_by_sheet;
 use crate::medium::MediumStack;
 use crate::scene::{Passage, Scene};
@@ -25,15 +25,27 @@ pub(crate) enum Glass {
 /// Largest number of surfaces that a ray passes. By then no light is left, or the scene is broken.
 const MAX_SURFACES: usize = 1024;
 
-/// Returns the transmittance along a ray up to a distance, which may be infinite, and the number of rays that
-/// were traced for it. `media` holds the media at the ray's start; objects in `bulbs` do not block it.
+/// Where a shadow ray ends, and what it passes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Target<'a> {
+    /// Metres along the ray; infinite for distant lights.
+    pub distance: f64,
+    /// The surface that it ends on, if it ends on one. What is coplanar with that does not lie in between.
+    pub surface: Option<EndSurface>,
+    pub glass: Glass,
+    /// Objects that do not block it.
+    pub bulbs: &'a [usize],
+}
+
+/// Returns the transmittance along a ray to its target, and the number of rays that were traced for it. `media`
+/// holds the media at the ray's start.
 pub(crate) fn transmittance(
     scene: &Scene,
     ray: &SpaceRay,
-    distance: f64,
+    target: &Target,
     media: &MediumStack,
-    (glass, bulbs): (Glass, &[usize]),
 ) -> (DVec3, u32) {
+    let &Target { distance, surface, glass, bulbs } = target;
     if bulbs.is_empty() && !scene.see_through && !scene.holes {
         let hidden = scene.geometry.anything_between(ray, distance);
         return (if hidden { DVec3::ZERO } else { media.transmittance(distance) }, 1);
@@ -42,7 +54,7 @@ pub(crate) fn transmittance(
     // Set if a surface was passed that transmits part of the light. A ray that is not blocked tests all
     // surfaces on its way.
     let through = Cell::new(false);
-    let hidden = scene.geometry.any_between(ray, distance, |candidate| {
+    let hidden = scene.geometry.blocked_between(ray, distance, |candidate| {
         if bulbs.contains(&candidate.object) {
             return false;
         }
@@ -59,11 +71,15 @@ pub(crate) fn transmittance(
         return (media.transmittance(distance), 1);
     }
     let (mut left, mut rays) = (DVec3::ONE, 1);
+    let end = surface.map(|surface| (surface, ray.at(distance)));
+    let before_end = |candidate: &Candidate| {
+        end.is_none_or(|(surface, position)| !surface.is_coplanar(scene, position, candidate))
+    };
     let (mut ray, mut travelled, mut media) = (*ray, 0.0, media.clone());
     for _ in 0..MAX_SURFACES {
         rays += 1;
         let next = nearest_layers(scene, &ray, distance - travelled, |candidate| {
-            open(candidate.object) && !bulbs.contains(&candidate.object)
+            open(candidate.object) && !bulbs.contains(&candidate.object) && before_end(candidate)
         });
         let Some(Layers { top, below }) = next else {
             return (left * media.transmittance(distance - travelled), rays);

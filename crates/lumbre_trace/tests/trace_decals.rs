@@ -8,7 +8,7 @@ use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{AlphaMode, Light, Material, Surface};
-use lumbre_scene::{Mesh, Quadric, QuadricShape, Transform};
+use lumbre_scene::{Medium, Mesh, Quadric, QuadricShape, Transform};
 use lumbre_trace::{Branch, Kind, Picture, TraceOptions};
 
 use support::*;
@@ -223,32 +223,127 @@ fn decals_seen_from_behind_are_not_over_the_other_side() {
     assert_all(&through, mixed(&DECALS[..1], WALL.as_dvec3()), 1e-6);
 }
 
+/// What lies between a floor and a panel that lights it.
+#[derive(Clone, Copy)]
+enum Between {
+    Nothing,
+    /// A thin sheet that transmits half of the light.
+    Sheet,
+    /// A black pane with an alpha of one half.
+    Pane,
+}
+
+/// Returns the light of a floor under a panel that emits 1, with decals in the panel's plane. Masked emitters are
+/// not `sampled`, so that paths hit them by chance.
+fn under_a_panel(decals: &[(Vec3, f32)], between: Between, sampled: bool) -> Picture {
+    let mut world = World::new();
+    let floor = Quadric::new(QuadricShape::Plane);
+    exact(&mut world, floor, painted(Vec3::splat(0.5), false), Transform::IDENTITY);
+    let down = DQuat::from_rotation_x(std::f64::consts::PI) * DQuat::from_rotation_y(0.3);
+    let above = Transform::from_xyz(0.1, 0.7, 0.2).with_rotation(down);
+    let alpha_mode = if sampled { AlphaMode::Opaque } else { AlphaMode::Mask { cutoff: 0.5 } };
+    let panel = Material { alpha_mode, ..painted(Vec3::ONE, true) };
+    world.spawn((Mesh(Arc::new(shapes::plane(1.0, 1.0, 1, 1))), panel, above));
+    for (own, steps) in decals.iter().zip(3..) {
+        world.spawn((Mesh(Arc::new(shapes::plane(2.0, 2.0, steps, steps))), decal(*own, true), above));
+    }
+    let half = Mesh(Arc::new(shapes::plane(20.0, 20.0, 1, 1)));
+    let half_way = Transform { translation: DVec3::new(0.0, 0.35, 0.0), ..above };
+    match between {
+        Between::Nothing => {}
+        Between::Sheet => {
+            let thin = Medium { thin: true, ..Medium::default() };
+            world.spawn((half, Material { transmission: Vec3::splat(0.5), ..black() }, thin, half_way));
+        }
+        Between::Pane => {
+            let double_sided = true;
+            let pane = Material { double_sided, ..decal((Vec3::ZERO, 0.5), false) };
+            world.spawn((half, pane, half_way));
+        }
+    }
+    camera(&mut world, DVec3::new(2.0, 0.3, 0.0), DVec3::new(0.1, 0.0, 0.2), 0.02);
+    let depth = Some(1);
+    draw(&mut world, &TraceOptions { depth, ..paths(24, if sampled { 256 } else { 2048 }) }).0
+}
+
 #[test]
 fn an_emitter_under_a_decal_lights_others_by_what_is_left_uncovered() {
-    // Over a floor hangs a panel that a black decal of alpha 0.75 covers: the floor gets a quarter of its light,
-    // whether paths find the panel by sampling it or by chance.
-    let light = |alpha: f32, sampled: bool| {
+    // A black decal of alpha 0.75 covers a panel over a floor: the floor gets a quarter of its light, whether paths
+    // find the panel by sampling it or by chance, and half of that through what halves it on the way.
+    let mean = |picture: &Picture| picture.radiance.iter().sum::<DVec3>().x / picture.radiance.len() as f64;
+    let whole = mean(&under_a_panel(&[], Between::Nothing, true));
+    for sampled in [true, false] {
+        for (between, left) in [(Between::Nothing, 0.25), (Between::Sheet, 0.125), (Between::Pane, 0.125)] {
+            let picture = under_a_panel(&[(Vec3::ZERO, 0.75)], between, sampled);
+            assert_mean(&picture, DVec3::splat(left * whole));
+        }
+    }
+}
+
+#[test]
+fn emissive_decals_light_others_as_they_look() {
+    // The light of the mixed colour; that of the panel alone is another one.
+    let mean = |picture: &Picture| picture.radiance.iter().sum::<DVec3>().x / picture.radiance.len() as f64;
+    let decals = [(Vec3::ZERO, 0.5), (Vec3::splat(0.5), 0.5)];
+    let color = mixed(&decals, DVec3::ONE);
+    assert_eq!(color, DVec3::splat(0.5));
+    // The decals are wider than the panel, so that the light is that of a panel of their size.
+    let wide = |decals: &[(Vec3, f32)]| {
         let mut world = World::new();
         let floor = Quadric::new(QuadricShape::Plane);
         exact(&mut world, floor, painted(Vec3::splat(0.5), false), Transform::IDENTITY);
-        let down = DQuat::from_rotation_x(std::f64::consts::PI) * DQuat::from_rotation_y(0.3);
+        let down = DQuat::from_rotation_x(std::f64::consts::PI);
         let above = Transform::from_xyz(0.1, 0.7, 0.2).with_rotation(down);
-        // Masked emitters are not sampled, and paths hit them by chance.
-        let alpha_mode = if sampled { AlphaMode::Opaque } else { AlphaMode::Mask { cutoff: 0.5 } };
-        let panel = Material { alpha_mode, ..painted(Vec3::ONE, true) };
-        world.spawn((Mesh(Arc::new(shapes::plane(1.0, 1.0, 1, 1))), panel, above));
-        if alpha > 0.0 {
-            let own = decal((Vec3::ZERO, alpha), true);
-            world.spawn((Mesh(Arc::new(shapes::plane(2.0, 2.0, 3, 3))), own, above));
+        let panel = Mesh(Arc::new(shapes::plane(2.0, 2.0, 1, 1)));
+        world.spawn((panel, painted(Vec3::ONE, true), above));
+        for (own, steps) in decals.iter().zip(3..) {
+            world.spawn((Mesh(Arc::new(shapes::plane(2.0, 2.0, steps, steps))), decal(*own, true), above));
         }
-        camera(&mut world, DVec3::new(2.0, 0.6, 0.0), DVec3::new(0.1, 0.0, 0.2), 0.02);
-        let depth = Some(1);
-        draw(&mut world, &TraceOptions { depth, ..paths(24, if sampled { 256 } else { 2048 }) }).0
+        camera(&mut world, DVec3::new(2.0, 0.3, 0.0), DVec3::new(0.1, 0.0, 0.2), 0.02);
+        draw(&mut world, &TraceOptions { depth: Some(1), ..paths(24, 1024) }).0
     };
-    let mean = |picture: &Picture| picture.radiance.iter().sum::<DVec3>().x / picture.radiance.len() as f64;
-    let whole = mean(&light(0.0, true));
-    for sampled in [true, false] {
-        let picture = light(0.75, sampled);
-        assert_mean(&picture, DVec3::splat(0.25 * whole));
+    let whole = mean(&wide(&[]));
+    assert_mean(&wide(&decals), color * whole);
+}
+
+#[test]
+fn glass_behind_an_opaque_surface_in_its_plane_lights_nothing() {
+    // An emissive sheet of glass, and in its plane an opaque one, which is what is visible there.
+    let light = |covered: bool| {
+        let mut world = World::new();
+        let floor = Quadric::new(QuadricShape::Plane);
+        exact(&mut world, floor, painted(Vec3::splat(0.5), false), Transform::IDENTITY);
+        let down = Transform::from_xyz(0.1, 0.7, 0.2).with_rotation(DQuat::from_rotation_x(3.1));
+        let glowing = Material { transmission: Vec3::splat(0.5), ..painted(Vec3::ONE, true) };
+        let thin = Medium { thin: true, ..Medium::default() };
+        world.spawn((Mesh(Arc::new(shapes::plane(1.0, 1.0, 1, 1))), glowing, thin, down));
+        if covered {
+            world.spawn((Mesh(Arc::new(shapes::plane(2.0, 2.0, 3, 3))), black(), down));
+        }
+        camera(&mut world, DVec3::new(2.0, 0.3, 0.0), DVec3::new(0.1, 0.0, 0.2), 0.02);
+        draw(&mut world, &paths(8, 64)).0.radiance.iter().sum::<DVec3>()
+    };
+    assert_eq!(light(true), DVec3::ZERO);
+    assert!(light(false).x > 1.0, "it lights the floor where nothing covers it");
+}
+
+#[test]
+fn a_decal_reaches_into_the_joint_of_its_wall_and_a_box() {
+    // A box stands on the wall and on the decals. The picture shows the last hundredths of a millimetre of the wall
+    // beside it, where rays cross the side of the box and the wall within the neighbourhood of one point.
+    let box_color = Vec3::new(0.3, 0.3, 0.9);
+    for place_in_box in [[0.5, 0.0], [0.0, 0.5]] {
+        let [x, z] = place_in_box;
+        let mut world = wall(painted(WALL, true), &DECALS, true);
+        let on_the_wall = Transform { translation: at(x, 0.5, z), ..place() };
+        world.spawn((Mesh(Arc::new(shapes::cuboid(Vec3::ONE, 1))), painted(box_color, true), on_the_wall));
+        camera(&mut world, at(-3.0 * x + 0.1, 1.2, -3.0 * z + 0.1), at(0.0, 0.0, 0.0), 2e-5);
+        let expected = mixed(&DECALS, WALL.as_dvec3());
+        let (picture, _) = draw(&mut world, &options(64));
+        let is = |pixel: &DVec3, color: DVec3| (*pixel - color).abs().max_element() < 1e-6;
+        let of_wall = picture.radiance.iter().filter(|pixel| is(pixel, expected)).count();
+        let of_box = picture.radiance.iter().filter(|pixel| is(pixel, box_color.as_dvec3())).count();
+        assert!(of_wall > 500 && of_box > 500, "the joint is not in the picture: {of_wall}, {of_box}");
+        assert_eq!(of_wall + of_box, picture.radiance.len(), "some rays miss the wall or its decals");
     }
 }

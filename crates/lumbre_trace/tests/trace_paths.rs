@@ -10,7 +10,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::{Light, Lobe, Material, ReflectionModel, SpotCone, Surface};
+use lumbre_optics::{AlphaMode, Light, Lobe, Material, ReflectionModel, SpotCone, Surface};
 use lumbre_scene::{Medium, Mesh, Quadric, QuadricShape, Transform};
 use lumbre_trace::{Ended, Integrator, Kind, TraceOptions, Tracer};
 
@@ -147,6 +147,124 @@ fn a_lamp_with_a_size_is_as_bright_as_its_middle() {
         println!("sun {sun}: {sized} ± {error} for {point}");
         assert!((sized - point).abs() < 5.0 * error, "{sized} ± {error} for {point}");
     }
+}
+
+/// A lamp of unit strength with a radius, as a light, or as an emissive sphere that is as bright.
+fn round_lamp(world: &mut World, radius: f32, at: DVec3, as_surface: bool) {
+    let place = Transform::from_translation(at);
+    if as_surface {
+        // The radiance of a sphere that lights a surface at a distance d by 1/d² of π is 1/r².
+        let material = glowing(radius.powi(-2), 0.0);
+        exact(world, Quadric::sphere(f64::from(radius)), material, place);
+    } else {
+        world.spawn((Light { radius, ..Light::point(Vec3::ONE) }, place));
+    }
+}
+
+/// The mean over a small picture of paths, and its standard error.
+fn mean_of_paths(world: &mut World, options: &TraceOptions) -> (f64, f64) {
+    let (picture, report) = draw(world, options);
+    let found = mean(&picture.radiance);
+    let pixels = (picture.radiance.len() as f64).sqrt();
+    (found, report.standard_error.expect("there are passes enough") * found / pixels)
+}
+
+#[test]
+fn a_lamp_with_a_size_shines_through_clear_glass() {
+    // A slab of index 1 does not bend light, and its two faces leave a quarter of it.
+    let lit = |radius: f32| {
+        let mut world = World::new();
+        let floor = Quadric::new(QuadricShape::Plane);
+        exact(&mut world, floor, Material::matt(Vec3::splat(0.5)), Transform::IDENTITY);
+        let slab = shapes::cuboid(Vec3::new(90.0, 0.2, 90.0), 1);
+        let half = Material { transmission: Vec3::splat(0.5), ior: 1.0, ..black() };
+        world.spawn((Mesh(Arc::new(slab)), half, Transform::from_xyz(0.0, 0.8, 0.0)));
+        round_lamp(&mut world, radius, DVec3::new(0.3, 2.0, 0.0), false);
+        camera(&mut world, DVec3::new(0.0, 0.1, 0.01), DVec3::ZERO, 1e-6);
+        mean_of_paths(&mut world, &paths(4, 4096))
+    };
+    let distance = 2.0_f64.hypot(0.3);
+    let wanted = 0.5 * 0.25 * 2.0 / distance.powi(3);
+    let (found, error) = lit(0.7);
+    println!("{found} ± {error} for {wanted}");
+    assert!((found - wanted).abs() < 5.0 * error && error < 0.02 * wanted, "{found} ± {error} for {wanted}");
+    // Nothing but a path that starts at the lamp finds a point behind glass.
+    assert_eq!(lit(0.0).0, 0.0);
+}
+
+#[test]
+fn a_lamp_with_a_size_lights_others_as_an_emissive_sphere_does() {
+    // Directly, through a slab that bends light and reflects it, by a mirror, by a shiny floor and past a pane: every
+    // way to find it, alone and together with the others.
+    let lit = |as_surface: bool, shininess: f32| {
+        let mut world = World::new();
+        let front = Surface {
+            diffuse: Vec3::splat(0.4),
+            specular: Vec3::splat(0.5),
+            shininess,
+            ..Surface::default()
+        };
+        let shiny = Material { front, lobe: Lobe::EnergyConserving, ..Material::default() };
+        exact(&mut world, Quadric::new(QuadricShape::Plane), shiny, Transform::IDENTITY);
+        // The slab covers a part of the lamp.
+        let slab = shapes::cuboid(Vec3::new(2.0, 0.3, 2.0), 1);
+        world.spawn((Mesh(Arc::new(slab)), glass(1.5), fresnel(), Transform::from_xyz(1.1, 0.8, 0.0)));
+        let mirror = Transform::from_xyz(-1.0, 0.0, 0.0).with_rotation(DQuat::from_rotation_z(-0.5 * PI));
+        world.spawn((Mesh(Arc::new(shapes::plane(6.0, 6.0, 1, 1))), self::mirror(0.8), mirror));
+        let pane = Material { alpha: 0.5, alpha_mode: AlphaMode::Blend, double_sided: true, ..black() };
+        world.spawn((
+            Mesh(Arc::new(shapes::plane(0.6, 0.6, 1, 1))),
+            pane,
+            Transform::from_xyz(-0.1, 0.9, 0.3),
+        ));
+        round_lamp(&mut world, 0.6, DVec3::new(0.2, 1.9, 0.0), as_surface);
+        camera(&mut world, DVec3::new(-0.3, 0.5, 0.7), DVec3::new(0.1, 0.0, 0.0), 0.02);
+        mean_of_paths(&mut world, &paths(8, 2048))
+    };
+    for shininess in [8.0, 300.0] {
+        let [(lamp, own), (sphere, other)] = [lit(false, shininess), lit(true, shininess)];
+        println!("exponent {shininess}: {lamp} ± {own} as a lamp, {sphere} ± {other} as a sphere");
+        assert!((lamp - sphere).abs() < 5.0 * own.hypot(other), "{lamp} ± {own}, {sphere} ± {other}");
+        assert!(own.hypot(other) < 0.015 * sphere, "the test sees nothing");
+    }
+}
+
+#[test]
+fn the_eye_sees_no_lamp_with_a_size() {
+    // Neither directly, nor in a mirror, nor through glass: as in frames.
+    let mut world = World::new();
+    round_lamp(&mut world, 0.5, DVec3::ZERO, false);
+    let mirror = Transform::from_xyz(0.0, -2.0, 0.0);
+    world.spawn((Mesh(Arc::new(shapes::plane(8.0, 8.0, 1, 1))), self::mirror(1.0), mirror));
+    exact(&mut world, Quadric::sphere(0.2), glass(1.5), Transform::from_xyz(0.0, 0.0, 1.5));
+    camera(&mut world, DVec3::new(0.0, 0.3, 5.0), DVec3::new(0.0, -0.5, 0.0), 0.8);
+    let (picture, _) = draw(&mut world, &paths(32, 16));
+    assert!(picture.radiance.iter().all(|pixel| *pixel == DVec3::ZERO));
+    // Negative control: a matt floor instead of the mirror is lit.
+    world.spawn((
+        Mesh(Arc::new(shapes::plane(8.0, 8.0, 1, 1))),
+        Material::matt(Vec3::ONE),
+        Transform::from_xyz(0.0, -1.5, 0.0),
+    ));
+    let (picture, _) = draw(&mut world, &paths(32, 16));
+    assert!(picture.radiance.iter().any(|pixel| pixel.x > 0.1));
+}
+
+#[test]
+fn a_large_lamp_in_a_shiny_floor_is_found_by_the_better_of_two_ways() {
+    // Sampling the lamp alone, as paths without reflections do, seldom meets a sharp lobe; paths do. Both have the
+    // same mean.
+    let mut world = World::new();
+    let front = Surface { diffuse: Vec3::ZERO, specular: Vec3::ONE, shininess: 3000.0, ..Surface::default() };
+    let shiny = Material { front, lobe: Lobe::EnergyConserving, ..Material::default() };
+    exact(&mut world, Quadric::new(QuadricShape::Plane), shiny, Transform::IDENTITY);
+    round_lamp(&mut world, 0.8, DVec3::new(0.0, 1.5, -1.5), false);
+    camera(&mut world, DVec3::new(0.0, 1.5, 1.5), DVec3::ZERO, 1e-3);
+    let [(alone, of_one), (both, of_two)] =
+        [Some(0), None].map(|depth| mean_of_paths(&mut world, &TraceOptions { depth, ..paths(4, 1024) }));
+    println!("{alone} ± {of_one} by lamps alone, {both} ± {of_two} by both");
+    assert!((alone - both).abs() < 5.0 * of_one.hypot(of_two), "{alone} ± {of_one}, {both} ± {of_two}");
+    assert!(of_two < 0.25 * of_one && of_two < 0.01 * both, "{of_two} against {of_one}");
 }
 
 #[test]

@@ -42,3 +42,4 @@ mod separate_light;
 mod sky;
 mod soft_shadows;
 mod texture_coordinates;
+mod two_path_tracers;

@@ -77,6 +77,21 @@ impl Candidates {
         Ok(())
     }
 
+    /// Takes the time of a way, and its point, which replaces that of an earlier measurement. A way without a point is
+    /// dropped.
+    pub fn take_anew(&mut self, way: DrawSettings, milliseconds: Option<Spread>, point: Option<Point>) {
+        let Some(point) = point else { return };
+        let point = Point { milliseconds, ..point };
+        let place = self.place(&way).unwrap_or(self.settings.len());
+        if place == self.settings.len() {
+            self.settings.push(way);
+            self.points.push(point);
+        } else {
+            self.points[place] = point;
+        }
+        self.latest.push(place);
+    }
+
     /// Returns the index of a way, or `None` if it was not measured.
     pub fn place(&self, way: &DrawSettings) -> Option<usize> {
         self.settings.iter().position(|known| known == way)

@@ -182,6 +182,20 @@ impl Choices {
         DrawSettings { shadow_resolution, ..most }
     }
 
+    /// Returns the most accurate settings with the crudest choice of each kind in turn, and with one sample a pixel.
+    pub fn crude(&self) -> Vec<DrawSettings> {
+        let reference = self.reference();
+        let of_stages = Stage::ALL.into_iter().filter_map(|stage| stage.others(reference, self).pop());
+        of_stages.chain([DrawSettings { multisample: false, ..reference }]).collect()
+    }
+
+    /// Returns the settings with the crudest choice of every kind.
+    pub fn crudest(&self) -> DrawSettings {
+        Stage::ALL
+            .into_iter()
+            .fold(self.reference(), |way, stage| stage.others(way, self).pop().unwrap_or(way))
+    }
+
     /// Returns the choices for a level that is displayed with this exposure, or with that of its cameras.
     pub fn of(world: &mut World, exposure: Option<f32>) -> Self {
         let mut lights = world.query::<&Light>();
@@ -200,7 +214,8 @@ impl Stage {
     /// All stages, in their order.
     pub const ALL: [Self; 3] = [Self::Evaluations, Self::Shadows, Self::Lamps];
 
-    /// Returns the settings that differ from `from` in what this stage chooses, without `from` itself.
+    /// Returns the settings that differ from `from` in what this stage chooses, without `from` itself, the crudest
+    /// last.
     pub fn others(self, from: DrawSettings, choices: &Choices) -> Vec<DrawSettings> {
         let mut others = Vec::new();
         match self {

@@ -1,22 +1,22 @@
-//! Finds the settings with which to draw a level. The choices are measured stage by stage at every camera,
-//! and what another way beats is dropped. Of the remaining ways, the one that reaches a goal best is chosen.
+//! Finds the settings with which to draw a level. A survey of all cameras finds those that stand for the others.
+//! At these the choices are measured stage by stage, and what another way beats is dropped. The remaining ways
+//! are drawn at every camera, the one that reaches a goal best is chosen, and its time checked at every camera.
 
+mod cameras;
 mod candidates;
 mod draw_settings;
 mod goal;
 mod lightmap_density;
+mod measured_ways;
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use bevy_ecs::prelude::*;
 use lumbre_optics::Shading;
-use lumbre_render::{FrameOptions, Gpu, Renderer};
-use lumbre_scene::{ActiveCamera, Camera, Name, SceneSettings, reduce_lightmaps};
+use lumbre_render::{Gpu, Renderer};
 
+use self::cameras::Cameras;
 pub(crate) use self::candidates::Candidates;
 pub use self::draw_settings::DrawSettings;
 pub(crate) use self::draw_settings::{Choices, Stage};
@@ -24,19 +24,16 @@ pub use self::goal::Goal;
 pub(crate) use self::goal::choose;
 pub use self::lightmap_density::LIGHTMAP_BYTES;
 use self::lightmap_density::LightmapSizes;
+use self::measured_ways::{MeasuredWays, Where};
 use crate::compile_ahead::device_ahead;
 use crate::converged::ConvergedBakes;
 use crate::findings::{cost_of, percent, short};
 use crate::folder::Folder;
-use crate::frame::Frame;
-use crate::frames::{DrawnFrame, draw_in_rounds};
 use crate::machine::machine;
 use crate::measured::Measured;
 use crate::rounds::Rounds;
 use crate::scene_file::SceneFile;
-use crate::{
-    Conditions, CostError, CostReport, ErrorOver, Listener, Plot, Point, Quantity, Settings, Spread, Study,
-};
+use crate::{Conditions, CostError, CostReport, Listener, Plot, Point, Quantity, Settings, Spread, Study};
 
 /// The result of tuning.
 #[derive(Clone, Debug, Default)]
@@ -120,84 +117,39 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     let scenes = SceneFile::given(conditions)?;
     let Some(scene) = scenes.first() else { return Ok(Tuned::default()) };
     let mut world = scene.open(conditions.aspect())?;
-    let cameras = cameras(&mut world);
+    let cameras = Cameras::of(&mut world);
     let choices = Choices::of(&mut world, None);
     let mut own = world.query::<&Shading>();
     let choosers = own.iter(&world).count();
     let lightmaps = LightmapSizes::of(&mut world);
-    let mut worlds = Worlds { scene, aspect: conditions.aspect(), by_reduction: BTreeMap::new() };
+    drop(world);
 
-    let mut measured = Measured { study: study(&scene.name), ..Measured::default() };
-    let mut found = Candidates::default();
-    // Once it is known at which cameras frames take longest, stages are timed there alone.
-    let every = vec![true; cameras.len()];
-    let mut slow = every.clone();
-    let stages = Stage::ALL.len() as f64;
-    let rounds = conditions.rounds(SECONDS[0] / stages);
-    // What a stage drops is not chosen any more, and what it keeps is measured again: the fewest rounds that tell
-    // times apart suffice for a quick result.
-    let rounds_of_stage =
-        Rounds { min: conditions.unless_quick(rounds.min, Spread::MIN_ROUNDS_TO_DISTINGUISH), ..rounds };
-    for (place, stage) in Stage::ALL.into_iter().enumerate() {
-        let share = |place: usize| 0.6 * place as f64 / stages;
-        let ways = found.next(stage, &choices);
-        if ways.len() > 1 {
-            let told = [share(place), share(place + 1)];
-            let drawn =
-                draw_at_cameras(conditions, &mut worlds, (&cameras, &slow), &ways, rounds_of_stage, told)?;
-            if found.settings.is_empty() {
-                slow = slowest(&drawn, cameras.len());
-                for (number, ((_, name), exact)) in cameras.iter().zip(drawn.iter().flatten()).enumerate() {
-                    measured.keep_reference(&reference_name(number, name), exact.picture.clone());
-                }
-            }
-            found.begin();
-            for (way, drawn) in ways.into_iter().zip(&drawn) {
-                found.take(way, longest(drawn), |label| {
-                    point(conditions, scene, &cameras, (&way, label), drawn, &mut measured)
-                })?;
-            }
-        }
-    }
-    // Only the ways that may be chosen are worth more rounds.
-    let ways: Vec<DrawSettings> = found.contenders().iter().map(|&one| found.settings[one]).collect();
-    let sizes = |way: &DrawSettings| lightmaps.bytes(way.lightmap_reduction);
-    let mut measure = |ways: &[DrawSettings], found: &mut Candidates, told: [f64; 2]| {
-        let drawn = draw_at_cameras(
-            conditions,
-            &mut worlds,
-            (&cameras, &every),
-            ways,
-            conditions.rounds(SECONDS[1]),
-            told,
-        )?;
-        found.begin();
-        for (way, drawn) in ways.iter().zip(&drawn) {
-            found.take(*way, longest(drawn), |label| {
-                point(conditions, scene, &cameras, (way, label), drawn, &mut measured)
-            })?;
-        }
-        Ok::<_, CostError>(())
-    };
-    measure(&ways, &mut found, [0.6, if lightmaps.is_empty() { 1.0 } else { 0.8 }])?;
-    let mut front = found.front();
-    let mut chosen = found.chosen(&front, goal);
+    let ways = MeasuredWays::new(conditions, scene, choices.reference(), study(&scene.name));
+    let mut search = Search { conditions, cameras, ways, found: Candidates::default() };
+    search.survey(&choices, [0.0, SURVEYED])?;
+    search.narrow_down(&choices, [SURVEYED, NARROWED_DOWN])?;
+    let mut chosen = search.choose(goal, [NARROWED_DOWN, CHOSEN])?;
+    let mut front = search.found.front();
     let mut of_lightmaps = Vec::new();
+    let sizes = |way: &DrawSettings| lightmaps.bytes(way.lightmap_reduction);
     // Without a goal, the errors of coarser lightmaps show best beside the most accurate settings.
     if let Some(of) = chosen.or(front.last().copied()).filter(|_| !lightmaps.is_empty()) {
-        let variants = lightmap_density::variants(found.settings[of]);
-        let others: Vec<DrawSettings> = front.iter().map(|&one| found.settings[one]).collect();
+        let variants = lightmap_density::variants(search.found.settings[of]);
+        let others: Vec<DrawSettings> = front.iter().map(|&one| search.found.settings[one]).collect();
         let ways: Vec<DrawSettings> = others.into_iter().chain(variants.iter().copied().skip(1)).collect();
-        measure(&ways, &mut found, [0.8, 1.0])?;
+        search.measure_everywhere(&ways, [CHOSEN, 1.0])?;
+        let found = &search.found;
         let places: Vec<usize> = variants.iter().filter_map(|variant| found.place(variant)).collect();
         let points: Vec<(&Point, f64)> =
             places.iter().map(|&place| (&found.points[place], sizes(&found.settings[place]))).collect();
         chosen =
             chosen.map(|chosen| lightmap_density::choose(&points, goal).map_or(chosen, |one| places[one]));
         of_lightmaps = lightmap_density::findings(&points);
-        front = lightmap_density::front(&found, chosen, sizes);
+        front = lightmap_density::front(found, chosen, sizes);
     }
+    let Search { found, cameras, ways, .. } = search;
     let Candidates { settings, points, .. } = found;
+    let mut measured = ways.pictures;
     let mut study = Study { points, ..std::mem::take(&mut measured.study) };
     if !lightmaps.is_empty() {
         for (point, way) in study.points.iter_mut().zip(&settings) {
@@ -209,141 +161,125 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
             "{choosers} objects choose their own shading and keep it here; --shading in the commands overrides it."
         ));
     }
-    study.findings = findings(&study.points, &front, chosen, goal, cameras.len());
+    study.findings = findings(&study.points, &front, chosen, goal, &cameras);
     study.findings.extend(of_lightmaps);
     Ok(Tuned { study, settings, front, chosen, pictures: measured })
 }
 
-/// Returns for each camera whether frames there may be the slowest with some of these settings: where their range
-/// of times is not below that of the slowest camera.
-fn slowest(drawn: &[Vec<DrawnFrame>], cameras: usize) -> Vec<bool> {
-    let mut slow = vec![false; cameras];
-    for of_way in drawn {
-        let Some(longest) = longest(of_way) else { continue };
-        for (slow, drawn) in slow.iter_mut().zip(of_way) {
-            *slow |= drawn.spread().is_some_and(|spread| !spread.is_below(&longest));
+/// Fractions of the work that are done after each part of it; the rest is for coarser lightmaps.
+const SURVEYED: f64 = 0.2;
+const NARROWED_DOWN: f64 = 0.6;
+const CHOSEN: f64 = 0.8;
+
+/// How often the choice is made again because another camera turns out to be the slowest with it.
+const CHANGES_OF_MIND: usize = 2;
+
+/// What is known while settings are searched for.
+struct Search<'a> {
+    conditions: &'a Conditions<'a>,
+    cameras: Cameras,
+    ways: MeasuredWays<'a>,
+    found: Candidates,
+}
+
+impl Search<'_> {
+    /// Draws the most accurate settings and the crudest ones of every kind at all cameras, to find the cameras that
+    /// stand for all of them.
+    fn survey(&mut self, choices: &Choices, [before, after]: [f64; 2]) -> Result<(), CostError> {
+        let reference = choices.reference();
+        let extremes = [reference, choices.crudest()];
+        let crude: Vec<DrawSettings> = [reference].into_iter().chain(choices.crude()).collect();
+        let (every, none) = (self.cameras.every(), self.cameras.none());
+        let middle = 0.5 * (before + after);
+        let rounds = self.fewest_rounds();
+        let pictured = Where { timed: &none, pictured: &every };
+        self.ways.draw(&self.cameras, &crude, pictured, rounds, [before, middle])?;
+        if self.cameras.all.len() > 1 {
+            let timed = Where { timed: &every, pictured: &none };
+            let times = self.ways.draw(&self.cameras, &extremes, timed, rounds, [middle, after])?;
+            let errors = |way: &DrawSettings| {
+                let known = self.ways.errors(way, &self.cameras);
+                known.into_iter().map(Option::unwrap_or_default).collect()
+            };
+            let errors: Vec<Vec<f64>> = crude.iter().map(errors).collect();
+            self.cameras.choose(&times, &errors);
         }
+        Ok(())
     }
-    slow
-}
 
-/// Returns the name of a camera's reference picture.
-fn reference_name(number: usize, camera: &str) -> String {
-    format!("reference {number} {camera}")
-}
-
-/// Returns the time of the slowest camera, by its median.
-fn longest(drawn: &[DrawnFrame]) -> Option<Spread> {
-    let spreads = drawn.iter().filter_map(|drawn| Spread::of(&drawn.times));
-    spreads.max_by(|a, b| a.median.total_cmp(&b.median))
-}
-
-/// Returns the cameras with their names. Entities are the same whenever the file is read.
-fn cameras(world: &mut World) -> Vec<(Entity, String)> {
-    let mut cameras = world.query_filtered::<(Entity, Option<&Name>, Has<ActiveCamera>), With<Camera>>();
-    let mut found: Vec<(Entity, String, bool)> = cameras
-        .iter(world)
-        .map(|(entity, name, active)| (entity, name.map_or("camera", Name::as_str).to_owned(), active))
-        .collect();
-    // The active camera comes first.
-    found.sort_by_key(|(entity, _, active)| (!active, *entity));
-    found.into_iter().map(|(entity, name, _)| (entity, name)).collect()
-}
-
-/// The level, as it is read and with coarser lightmaps. Ways to draw it share these Worlds, so that a renderer
-/// uploads each of them once.
-struct Worlds<'a> {
-    scene: &'a SceneFile,
-    aspect: f64,
-    by_reduction: BTreeMap<u32, (Arc<Mutex<World>>, SceneSettings)>,
-}
-
-impl Worlds<'_> {
-    /// Returns the World with lightmaps reduced by this much, and the settings of the file.
-    ///
-    /// # Errors
-    /// [`CostError::Load`].
-    fn with_lightmaps(&mut self, reduction: u32) -> Result<(Arc<Mutex<World>>, SceneSettings), CostError> {
-        if let Some(known) = self.by_reduction.get(&reduction) {
-            return Ok(known.clone());
+    /// Measures the choices of one stage after the other at the cameras that stand for all. What a stage drops is not
+    /// chosen any more, and what it keeps is measured again: for a quick result the fewest rounds suffice that tell
+    /// times apart.
+    fn narrow_down(&mut self, choices: &Choices, [before, after]: [f64; 2]) -> Result<(), CostError> {
+        let stages = Stage::ALL.len() as f64;
+        let rounds = self.conditions.rounds(SECONDS[0] / stages);
+        let min = self.conditions.unless_quick(rounds.min, Spread::MIN_ROUNDS_TO_DISTINGUISH);
+        let share = |place: usize| before + (after - before) * place as f64 / stages;
+        for (place, stage) in Stage::ALL.into_iter().enumerate() {
+            let ways = self.found.next(stage, choices);
+            if ways.len() > 1 {
+                let pictured = self.cameras.inaccurate.clone();
+                let told = [share(place), share(place + 1)];
+                self.measure(&ways, &pictured, Rounds { min, ..rounds }, told)?;
+            }
         }
-        let mut world = self.scene.open(self.aspect)?;
-        reduce_lightmaps(&mut world, reduction);
-        let own = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
-        let new = (Arc::new(Mutex::new(world)), own);
-        self.by_reduction.insert(reduction, new.clone());
-        Ok(new)
+        Ok(())
     }
-}
 
-/// Draws frames with some settings at every camera, times those at the cameras for which `timed` says so, and
-/// returns all by settings and camera. `told` are the
-/// fractions that are done before and after.
-fn draw_at_cameras(
-    conditions: &Conditions<'_>,
-    worlds: &mut Worlds<'_>,
-    (cameras, timed): (&[(Entity, String)], &[bool]),
-    ways: &[DrawSettings],
-    rounds: Rounds,
-    told: [f64; 2],
-) -> Result<Vec<Vec<DrawnFrame>>, CostError> {
-    let mut frames = Vec::new();
-    for settings in ways {
-        let (world, own) = worlds.with_lightmaps(settings.lightmap_reduction)?;
-        for ((camera, _), is_timed) in cameras.iter().zip(timed) {
-            let options = FrameOptions { camera: Some(*camera), ..FrameOptions::default() };
-            let frame = Frame::of(&world, options).with_settings(settings.of_scene(own)).sharing("tune");
-            frames.push(frame.timed(*is_timed));
+    /// Measures the ways that may be chosen, chooses the one that reaches the goal best, and checks at which cameras
+    /// that one takes longest.
+    fn choose(&mut self, goal: Goal, [before, after]: [f64; 2]) -> Result<Option<usize>, CostError> {
+        let ways: Vec<DrawSettings> =
+            self.found.contenders().iter().map(|&one| self.found.settings[one]).collect();
+        let middle = 0.5 * (before + after);
+        self.measure_everywhere(&ways, [before, middle])?;
+        let mut chosen = self.found.chosen(&self.found.front(), goal);
+        for _ in 0..CHANGES_OF_MIND {
+            let Some(way) = chosen.map(|one| self.found.settings[one]) else { break };
+            if self.cameras.all.len() == 1 {
+                break;
+            }
+            let (every, none) = (self.cameras.every(), self.cameras.none());
+            let at = Where { timed: &every, pictured: &none };
+            let times = self.ways.draw(&self.cameras, &[way], at, self.fewest_rounds(), [middle, after])?;
+            if !times.first().is_some_and(|times| self.cameras.add_slower(times)) {
+                break;
+            }
+            self.measure_everywhere(&ways, [middle, after])?;
+            chosen = self.found.chosen(&self.found.front(), goal);
         }
+        Ok(chosen)
     }
-    let mut drawn = draw_in_rounds(conditions, frames, rounds, told)?.into_iter();
-    let mut found = Vec::new();
-    while drawn.len() > 0 {
-        found.push(drawn.by_ref().take(cameras.len()).collect());
-    }
-    Ok(found)
-}
 
-/// Creates the point of a way, with the picture and the error of the camera with the largest error. `None` if
-/// there is no camera.
-fn point(
-    conditions: &Conditions<'_>,
-    scene: &SceneFile,
-    cameras: &[(Entity, String)],
-    (way, label): (&DrawSettings, String),
-    drawn: &[DrawnFrame],
-    measured: &mut Measured,
-) -> Result<Option<Point>, CostError> {
-    let mut worst: Option<Measured> = None;
-    for (number, ((_, camera), drawn)) in cameras.iter().zip(drawn).enumerate() {
-        let mut one = Measured { study: study(&scene.name), ..Measured::default() };
-        let reference = one.file_name(&reference_name(number, camera));
-        let kept = measured.pictures.get(&reference).cloned();
-        one.pictures.extend(kept.map(|picture| (reference.clone(), picture)));
-        let point = Point {
-            series: way.shading.name().to_owned(),
-            label: label.clone(),
-            counts: drawn.counts(),
-            command: format!(
-                "lumbre render {} -o frame.png --camera '{camera}' --size {} {}",
-                scene.in_commands(),
-                conditions.size_text(),
-                way.arguments()
-            ),
-            ..Point::default()
-        };
-        one.add_picture(point, drawn.picture.clone(), &reference, ErrorOver::Picture)?;
-        let error = |of: &Measured| {
-            of.study.points.first().and_then(|point| point.error).map_or(0.0, |error| error.relative_rmse)
-        };
-        if worst.as_ref().is_none_or(|worst| error(&one) > error(worst)) {
-            worst = Some(one);
-        }
+    /// Measures ways for a decision: their errors at every camera, and their times where frames take longest.
+    fn measure_everywhere(&mut self, ways: &[DrawSettings], told: [f64; 2]) -> Result<(), CostError> {
+        self.measure(ways, &self.cameras.every(), self.conditions.rounds(SECONDS[1]), told)
     }
-    let Some(mut worst) = worst else { return Ok(None) };
-    measured.pictures.append(&mut worst.pictures);
-    measured.heat.append(&mut worst.heat);
-    Ok(worst.study.points.pop())
+
+    /// Times ways side by side where frames take longest, draws the pictures that are missing of them, and takes all
+    /// as the latest measurement.
+    fn measure(
+        &mut self,
+        ways: &[DrawSettings],
+        pictured: &[bool],
+        rounds: Rounds,
+        told: [f64; 2],
+    ) -> Result<(), CostError> {
+        let at = Where { timed: &self.cameras.slow, pictured };
+        let times = self.ways.draw(&self.cameras, ways, at, rounds, told)?;
+        self.found.begin();
+        for (way, times) in ways.iter().zip(times) {
+            let longest = times.into_iter().flatten().max_by(|a, b| a.median.total_cmp(&b.median));
+            self.found.take_anew(*way, longest, self.ways.point(way));
+        }
+        Ok(())
+    }
+
+    /// Returns the fewest rounds with which times are told apart.
+    fn fewest_rounds(&self) -> Rounds {
+        let few = Spread::MIN_ROUNDS_TO_DISTINGUISH;
+        Rounds { min: few, max: few, ..self.conditions.rounds(0.0) }
+    }
 }
 
 fn study(scene: &str) -> Study {
@@ -368,7 +304,7 @@ fn findings(
     front: &[usize],
     chosen: Option<usize>,
     goal: Goal,
-    cameras: usize,
+    cameras: &Cameras,
 ) -> Vec<String> {
     let within = [
         goal.milliseconds.map(|most| format!("{} ms", short(most))),
@@ -386,11 +322,18 @@ fn findings(
         )),
         _ => None,
     };
-    let ways = format!(
-        "{} settings were measured at {cameras} {}; {} of them are not beaten by any others in both time and error.",
+    let mut measured = format!(
+        "{} settings were measured; {} of them are not beaten by any others in both time and error.",
         points.len(),
-        if cameras == 1 { "camera" } else { "cameras" },
         front.len()
     );
-    choice.into_iter().chain([ways]).collect()
+    if cameras.all.len() > 1 {
+        measured += &format!(
+            " Of the {} cameras, frames take longest at {}, where they were timed; errors are the largest of all cameras, and for settings that were dropped early the largest of {}.",
+            cameras.all.len(),
+            cameras.named(&cameras.slow),
+            cameras.named(&cameras.inaccurate)
+        );
+    }
+    choice.into_iter().chain([measured]).collect()
 }

@@ -107,6 +107,41 @@ fn samples_are_taken_where_edges_want_them() {
     assert!(one > 0.05, "without them it is off by {one}");
 }
 
+#[test]
+fn every_camera_has_a_say_though_few_are_timed() {
+    // A floor under lamps takes longest, slats far from it need four samples a pixel, and of two cameras nothing is
+    // seen. The most accurate frame has the slats' edges; the floor alone would do with one sample.
+    let mut world = smooth_light();
+    let away = DVec3::new(500.0, 0.0, 0.0);
+    let front = Surface { emission: Vec3::ONE, ..Surface::default() };
+    let material = Material { front, ..Material::matt(Vec3::ZERO) };
+    let slat = Mesh(Arc::new(shapes::plane(0.05, 8.0, 1, 1)));
+    for number in 0..60 {
+        let place = Transform::from_translation(away + DVec3::X * (0.13 * f64::from(number) - 3.9));
+        world.spawn((Name::new("slat"), slat.clone(), material.clone(), place));
+    }
+    for (name, eye, target) in [
+        ("nothing", DVec3::Y * 50.0, DVec3::Y * 90.0),
+        ("slats", away + DVec3::new(0.0, 6.0, 0.5), away),
+        ("nothing else", DVec3::Y * 60.0, DVec3::Y * 90.0),
+    ] {
+        let up = if name == "slats" { DVec3::Y } else { DVec3::X };
+        let place = Transform::from_translation(eye).looking_at(target, up);
+        world.spawn((Name::new(name), Camera::default(), place));
+    }
+    let (chosen, tuned) = cheapest_within(0.01, world);
+    assert_eq!((chosen.shading, chosen.multisample), (Shading::Gouraud, true), "{:?}", tuned.study.findings);
+    let said =
+        tuned.study.findings.iter().find(|said| said.contains("Of the 4 cameras")).expect("it is said");
+    assert!(said.contains("frames take longest at \"eye\""), "{said}");
+    // Flat shading errs most on the floor, one sample on the slats.
+    assert!(said.ends_with("the largest of \"eye\" and \"slats\"."), "{said}");
+    let point = &tuned.study.points[tuned.chosen.unwrap()];
+    assert!(point.error.unwrap().relative_rmse <= 0.01);
+    let one = error_of(&tuned, |settings| !settings.multisample && settings.shading == Shading::Gouraud);
+    assert!(one > 0.05, "the slats do not need four samples: {one}");
+}
+
 /// Lamps that do not end: some with this brightness over the visible floor, and many faint ones far beside
 /// it.
 fn lamps_afar((near, color): (u32, f32), far: u32) -> World {

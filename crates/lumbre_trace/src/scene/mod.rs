@@ -8,7 +8,7 @@ mod texture;
 
 use bevy_ecs::world::World;
 use glam::{DVec2, DVec3};
-use lumbre_optics::{AlphaMode, ReflectionModel};
+use lumbre_optics::{AlphaMode, ReflectionModel, try_normalize};
 use lumbre_scene::SceneSettings;
 
 use crate::TraceError;
@@ -95,6 +95,10 @@ impl Scene {
             })
             .collect();
         let passable: Vec<Passable> = collected.objects.iter().map(Passable::of).collect();
+        // Glowing objects may be bulbs, which let the light of their lamp pass.
+        let always_blocks =
+            |index: usize| passable[index].passage == Passage::Closed && !collected.objects[index].glows();
+        let geometry = Geometry::build(triangles, &quadrics, always_blocks);
         let is_open = |found: &Passable| matches!(found.passage, Passage::Clear | Passage::Covering);
         Ok(Self {
             see_through: passable.iter().any(is_open),
@@ -102,7 +106,7 @@ impl Scene {
             holes: passable.iter().any(|found| found.passage == Passage::Cut),
             solids: passable.iter().any(|found| found.solid),
             passable,
-            geometry: Geometry::build(triangles, &quadrics),
+            geometry,
             settings: collected.settings,
             origin,
             objects: collected.objects,
@@ -147,6 +151,21 @@ impl Scene {
             Passage::Covering => true,
             Passage::Clear => with_solids || object.thin,
             Passage::Closed | Passage::Cut => false,
+        }
+    }
+
+    /// Returns where a ray crosses a surface, and the unit geometric normal to its front there; 0 for a triangle
+    /// without area.
+    pub fn position_and_normal(&self, candidate: &Candidate) -> (DVec3, DVec3) {
+        match candidate.place {
+            Place::Exact { point, normal } => (point, normal),
+            Place::Triangle { triangle, weights: [second, third] } => {
+                let object = &self.objects[candidate.object];
+                let first = 3 * triangle as usize;
+                let [a, b, c] = object.corners([0, 1, 2].map(|next| object.shape.indices[first + next]));
+                let normal = try_normalize((b - a).cross(c - a)).unwrap_or_default();
+                (a + (b - a) * second + (c - a) * third, normal)
+            }
         }
     }
 

@@ -12,6 +12,10 @@ pub struct Triangle {
     pub normal: DVec3,
     pub area: f64,
     pub reflectance: DVec3,
+    /// The reflectance of its back side; 0 for a surface with one side.
+    pub back_reflectance: DVec3,
+    /// The share of the light that passes it in a straight line, from either side; 0 if it is opaque.
+    pub transmission: DVec3,
     pub emission: DVec3,
     /// A texture that multiplies the emission, and the texture coordinates of the corners.
     pub picture: Option<(Arc<Image>, [DVec2; 3])>,
@@ -37,6 +41,8 @@ pub struct Hit {
 pub struct Hierarchy {
     pub triangles: Vec<Triangle>,
     nodes: Vec<Node>,
+    /// Whether light passes any of the triangles.
+    has_sheets: bool,
 }
 
 impl Triangle {
@@ -93,7 +99,8 @@ impl Hierarchy {
         let mut nodes = Vec::new();
         let count = triangles.len();
         build(&mut triangles, 0, count, &mut nodes);
-        Self { triangles, nodes }
+        let has_sheets = triangles.iter().any(|triangle| triangle.transmission != DVec3::ZERO);
+        Self { triangles, nodes, has_sheets }
     }
 
     /// The lowest and the highest corner of the bounding box of all triangles.
@@ -106,9 +113,26 @@ impl Hierarchy {
         self.intersect(from, to - from, 1.0, true).is_some()
     }
 
-    /// Whether a triangle lies in a direction, at any distance.
-    pub fn hidden_along(&self, from: DVec3, direction: DVec3) -> bool {
-        self.intersect(from, direction, f64::INFINITY, true).is_some()
+    /// The share of the light that reaches a point from another one.
+    pub fn transmission(&self, from: DVec3, to: DVec3) -> DVec3 {
+        self.transmission_up_to(from, to - from, 1.0)
+    }
+
+    /// The share of the light that reaches a point from a direction.
+    pub fn transmission_along(&self, from: DVec3, direction: DVec3) -> DVec3 {
+        self.transmission_up_to(from, direction, f64::INFINITY)
+    }
+
+    fn transmission_up_to(&self, from: DVec3, direction: DVec3, max_distance: f64) -> DVec3 {
+        if !self.has_sheets {
+            let hidden = self.intersect(from, direction, max_distance, true).is_some();
+            return if hidden { DVec3::ZERO } else { DVec3::ONE };
+        }
+        // Every triangle is tested: such scenes are small.
+        let crossed = |triangle: &&Triangle| {
+            triangle.hit(from, direction).is_some_and(|distance| distance > 0.0 && distance < max_distance)
+        };
+        self.triangles.iter().filter(crossed).map(|triangle| triangle.transmission).product()
     }
 
     pub fn closest(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {

@@ -98,10 +98,8 @@ impl Lamps {
         for candidate in candidates.iter().flatten() {
             remaining -= candidate.weight;
             if remaining < 0.0 {
-                if scene.hidden(origin, candidate.target) {
-                    return DVec3::ZERO;
-                }
-                return candidate.light * (sum / candidate.weight / count as f64);
+                let arrives = scene.transmission(origin, candidate.target);
+                return arrives * candidate.light * (sum / candidate.weight / count as f64);
             }
         }
         DVec3::ZERO

@@ -1,6 +1,7 @@
 //! Path tracer for converged irradiance at points of a world's surfaces: f64, next-event estimation, Russian roulette,
-//! and a bounding volume hierarchy of its own. Front sides are diffuse, emitters one-sided, back sides black; the sky
-//! has one colour. It shares no code with the baker.
+//! and a bounding volume hierarchy of its own. Front sides are diffuse, emitters one-sided, back sides black unless the
+//! world's rule lights them; sheets let a part of the light pass in a straight line; the sky has one colour. It shares
+//! no code with the baker, nor with `lumbre_trace`, which it is compared with.
 
 mod bright;
 mod choice;
@@ -17,7 +18,7 @@ use std::f64::consts::PI;
 
 use bevy_ecs::world::World;
 use glam::{DVec2, DVec3};
-use lumbre_optics::Material;
+use lumbre_optics::{AlphaMode, Material};
 use lumbre_scene::{GlobalTransform, MaterialTextures, Mesh, SceneSettings, StaticObject};
 use rayon::prelude::*;
 
@@ -206,12 +207,26 @@ impl PathTracer {
                 break;
             };
             let triangle = &self.scene.triangles[hit.triangle];
-            let normal = triangle.normal;
-            if normal.dot(direction) >= 0.0 {
+            let is_front = triangle.normal.dot(direction) < 0.0;
+            let (normal, reflectance) = match is_front {
+                true => (triangle.normal, triangle.reflectance),
+                false => (-triangle.normal, triangle.back_reflectance),
+            };
+            origin += direction * hit.distance;
+            let (reflects, passes) = (reflectance.element_sum(), triangle.transmission.element_sum());
+            if passes > 0.0 {
+                let share = passes / (reflects + passes);
+                if random.uniform() < share {
+                    weight *= triangle.transmission / share;
+                    origin -= normal * self.offset;
+                    continue;
+                }
+                weight /= 1.0 - share;
+            }
+            if reflects == 0.0 {
                 break;
             }
-            weight *= triangle.reflectance;
-            origin += direction * hit.distance;
+            weight *= reflectance;
             let already_sampled =
                 self.bright.as_ref().is_some_and(|b| b.samples(self, hit.triangle, origin, hit.distance));
             origin += normal * self.offset;
@@ -256,10 +271,16 @@ impl PathTracer {
 /// The triangles of all static objects in world space.
 pub fn triangles(world: &mut World) -> Vec<Triangle> {
     let mut triangles = Vec::new();
+    let lights_backs = world.get_resource::<SceneSettings>().copied().unwrap_or_default().two_sided;
     let mut meshes = world.query_filtered::<(&Mesh, &Material, Option<&MaterialTextures>, &GlobalTransform), bevy_ecs::prelude::With<StaticObject>>();
     for (object, (mesh, material, textures, transform)) in meshes.iter(world).enumerate() {
         let mirrored = transform.0.matrix3.determinant() < 0.0;
         let emissive = textures.and_then(|textures| textures.emissive.as_ref());
+        let covers = material.alpha_mode == AlphaMode::Blend;
+        let opacity = if covers { f64::from(material.alpha) } else { 1.0 };
+        let reflectance = material.front.diffuse.as_dvec3() * opacity;
+        let transmission = material.transmission.as_dvec3() + DVec3::splat(1.0 - opacity);
+        let back_reflectance = if lights_backs && material.double_sided { reflectance } else { DVec3::ZERO };
         for (index, corners) in mesh.0.triangles().enumerate() {
             let [a, mut b, mut c] =
                 corners.map(|v| transform.0.transform_point3(mesh.0.positions[v as usize].as_dvec3()));
@@ -282,7 +303,9 @@ pub fn triangles(world: &mut World) -> Vec<Triangle> {
                 ac: c - a,
                 normal,
                 area: cross.length() / 2.0,
-                reflectance: material.front.diffuse.as_dvec3(),
+                reflectance,
+                back_reflectance,
+                transmission,
                 emission: material.front.emission.as_dvec3(),
                 picture,
                 source: [object, index],
