@@ -34,6 +34,7 @@ macro_rules! modules {
 
 modules!(
     "deferred_lighting",
+    "depth_plane",
     "display",
     "display_color",
     "forward",
@@ -51,6 +52,7 @@ modules!(
     "octahedral",
     "refraction",
     "shadow_caster",
+    "shadow_planes",
     "shadows",
     "shared_records",
     "shared_records_probe",

@@ -94,7 +94,7 @@ fn stages_passes_and_effects_sum_to_the_frame() {
     };
     // What each effect did in its first frame, separate from the others.
     let (shadows, bloom, display) = (of(&first, "shadow maps"), of(&first, "bloom"), of(&first, "display"));
-    assert_eq!((shadows.passes.len(), shadows.pipelines_made), (1, 2));
+    assert_eq!((shadows.passes.len(), shadows.pipelines_made), (2, 3));
     assert_eq!(shadows.uploaded_bytes, first.uploads.shadows);
     assert_eq!((bloom.passes.len(), bloom.pipelines_made), (4, 3), "{bloom:?}");
     assert!(bloom.gpu_ms.unwrap() > 0.0 && bloom.invocations.unwrap().fragment > 0);

@@ -220,6 +220,26 @@ const ROWS: &[Row] = &[
         add: |scene| scene.options.light_lists = LightLists::Clusters,
     },
     Row {
+        effect: "clusters of lights with a shadow",
+        called_for_by: "the same, with `shadow`",
+        features: &["CLUSTERS", "SHADOWED_CLUSTERS"],
+        before: |scene| {
+            occluder(scene);
+            spawn(scene, ranged(Light { shadow: true, ..Light::point(Vec3::splat(9.0)) }));
+        },
+        add: |scene| scene.options.light_lists = LightLists::Clusters,
+    },
+    Row {
+        effect: "clusters of spot lights with a shadow",
+        called_for_by: "the same, with cones as glTF's have them",
+        features: &["CLUSTERS", "SHADOWED_CLUSTERS", "INVERSE_SQUARE_SPOTS"],
+        before: |scene| {
+            occluder(scene);
+            spawn(scene, ranged(Light { shadow: true, ..cone() }));
+        },
+        add: |scene| scene.options.light_lists = LightLists::Clusters,
+    },
+    Row {
         effect: "clusters of other lights",
         called_for_by: "the same, for other lights with a range: OpenGL's cones, attenuations of their own",
         features: &["CLUSTERS", "RANGED_CLUSTERS"],

@@ -159,11 +159,20 @@ fn a_surface_that_waits_is_shown_as_far_as_it_can_be() {
 
 #[test]
 fn lamps_that_go_out_are_out_at_once() {
+    go_out(false);
+}
+
+#[test]
+fn lamps_with_a_shadow_that_go_out_are_out_at_once() {
+    go_out(true);
+}
+
+fn go_out(shadow: bool) {
     let mut scene = scene();
     let lamps: Vec<Entity> = (0..4)
         .map(|number| {
             let cone = SpotCone::Smooth { inner: 0.2, outer: 0.9 };
-            let lamp = Light::spot(Vec3::splat(4.0), cone).with_range(9.0);
+            let lamp = Light { shadow, ..Light::spot(Vec3::splat(4.0), cone).with_range(9.0) };
             let place = Transform::from_xyz(f64::from(number) - 1.5, 3.0, 0.0);
             scene.world.spawn((lamp, place.looking_at(DVec3::ZERO, DVec3::Z))).id()
         })

@@ -104,7 +104,8 @@ impl Kernel {
 
     /// Creates a kernel around a `call`: WESL statements that return an `array<f32, outputs>` computed from `x`, an
     /// `array<f32, inputs>`. They can use the `imports` of the module `optics::module`, compiled with these
-    /// `features` on and all others off.
+    /// `features` on and all others off. Imports from another module than one of `optics` are given as one path from
+    /// `package::` on.
     ///
     /// # Panics
     /// If it does not compile: the test itself is wrong.
@@ -118,6 +119,7 @@ impl Kernel {
     ) -> Self {
         let imports = imports.join(", ");
         let imports = match imports.contains("::") {
+            true if imports.starts_with("package::") => format!("import {imports};\n"),
             true => imports.split(", ").map(|path| format!("import package::optics::{path};\n")).collect(),
             false => format!("import package::optics::{module}::{{{imports}}};\n"),
         };
@@ -140,7 +142,8 @@ impl Kernel {
         Self { wgsl, source, features, inputs, outputs }
     }
 
-    /// Returns the same kernel with a changed shader: in the module `optics::module`, `from` is replaced by `to`.
+    /// Returns the same kernel with a changed shader: in the module `optics::module`, or in one that is given from
+    /// `package::` on, `from` is replaced by `to`.
     /// For tests of the tests.
     ///
     /// # Panics
@@ -236,17 +239,23 @@ impl Kernel {
     }
 }
 
-/// Compiles the program with the modules of `shaders/optics`, each as `edit` returns it for its name and text.
+/// Compiles the program with the modules of `shaders`, each as `edit` returns it for its name and text. The names
+/// of those that are not in `optics` begin with `package::`.
 fn compile(source: &str, features: &[String], edit: impl Fn(&str, String) -> String) -> String {
-    let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders/optics");
-    let files = std::fs::read_dir(&shaders).unwrap_or_else(|error| panic!("{shaders:?}: {error}"));
     let mut modules = vec![("kernel".to_owned(), source.to_owned())];
-    for file in files {
-        let path = file.unwrap_or_else(|error| panic!("{shaders:?}: {error}")).path();
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path:?}: {error}"));
-        let text = edit(&name, text);
-        modules.push((format!("optics/{name}"), text));
+    for (folder, prefix) in [("", "package::"), ("optics/", "")] {
+        let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders").join(folder);
+        let files = std::fs::read_dir(&shaders).unwrap_or_else(|error| panic!("{shaders:?}: {error}"));
+        for file in files {
+            let path = file.unwrap_or_else(|error| panic!("{shaders:?}: {error}")).path();
+            if path.extension().is_none_or(|extension| extension != "wesl") {
+                continue;
+            }
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path:?}: {error}"));
+            let text = edit(&format!("{prefix}{name}"), text);
+            modules.push((format!("{folder}{name}"), text));
+        }
     }
     let modules: Vec<_> =
         modules.iter().map(|(path, text)| (path.as_str(), Cow::Borrowed(text.as_str()))).collect();

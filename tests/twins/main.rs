@@ -9,6 +9,7 @@
 mod atmosphere;
 mod bounds;
 mod completeness;
+mod depth_planes;
 mod highlights;
 mod inputs;
 mod judge;

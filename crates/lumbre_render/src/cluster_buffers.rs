@@ -6,6 +6,7 @@ use crate::frame_bindings::FrameBuffer;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{ClusterGridData, InverseSquareLightData};
 use crate::light_clusters::{BoundingSphere, ClusteredView, LightClusters};
+use crate::shadow_light::BLACK_SHADOWED;
 use crate::table_texture::TableTexture;
 use crate::{Gpu, RenderError};
 
@@ -17,6 +18,7 @@ const LISTS: &str = "lists of lights per cluster";
 pub(crate) struct ClusterBuffers {
     pub clusters: LightClusters,
     inverse_square: Vec<BoundingSphere>,
+    shadowed: Vec<BoundingSphere>,
     ranged: Vec<BoundingSphere>,
     grid: GrowableBuffer<ClusterGridData>,
     lists: Option<wgpu::Buffer>,
@@ -30,6 +32,7 @@ impl ClusterBuffers {
         Self {
             clusters: LightClusters::default(),
             inverse_square: Vec::new(),
+            shadowed: Vec::new(),
             ranged: Vec::new(),
             grid: GrowableBuffer::uniform("cluster grid", 1),
             lists: None,
@@ -41,7 +44,9 @@ impl ClusterBuffers {
     /// Builds the lists of a frame.
     pub fn build(&mut self, view: &ClusteredView, lights: &SceneLights) {
         self.inverse_square.clear();
+        self.shadowed.clear();
         self.ranged.clear();
+        let number = |before: &[BoundingSphere]| u32::try_from(before.len()).unwrap_or(u32::MAX);
         for (reach, index) in lights.reaches.iter().zip(0..) {
             let sphere = |light| BoundingSphere {
                 light,
@@ -52,18 +57,20 @@ impl ClusterBuffers {
             match reach.class {
                 LightClass::Unbounded => {}
                 LightClass::InverseSquare => {
-                    let number = u32::try_from(self.inverse_square.len()).unwrap_or(u32::MAX);
-                    self.inverse_square.push(sphere(number));
+                    self.inverse_square.push(sphere(number(&self.inverse_square)));
                 }
+                LightClass::Shadowed => self.shadowed.push(sphere(number(&self.shadowed))),
                 LightClass::Ranged => self.ranged.push(sphere(index)),
             }
         }
-        // If no light of the second class is left, its shaders read the black light that follows all others.
+        // If no light of the third class is left, its shaders read the black light that follows all others.
         let black = u32::try_from(lights.reaches.len()).unwrap_or(u32::MAX);
-        self.clusters.build(view, [&self.inverse_square, &self.ranged], black);
+        let classes = [&self.inverse_square[..], &self.shadowed, &self.ranged];
+        self.clusters.build(view, classes, [BLACK_SHADOWED, black]);
         // Baked lights come last.
         let grid = &mut self.clusters.grid;
         grid.first_baked_inverse_square = lights.set.inverse_square.dynamic;
+        grid.first_baked_shadowed = lights.set.shadowed.dynamic;
         grid.first_baked_ranged = lights.set.every.dynamic;
         self.grid.replace([*grid]);
         self.lights.replace(lights.inverse_square.iter().copied().chain([InverseSquareLightData::BLACK]));

@@ -89,12 +89,9 @@ fn explain_with(
 ) -> Result<SceneExplanation, RenderError> {
     let target_format = wgpu::TextureFormat::Rgba8Unorm;
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
-    let mut lights = LightSet::of(world)?;
+    let mut lights = LightSet::of(world, options.shadows)?;
     if !options.lightmaps {
         lights = lights.without_lightmaps();
-    }
-    if !options.shadows {
-        lights = lights.without_shadows();
     }
     let objects = shown_objects(world);
     let counted = ObjectCensus::of(&objects);

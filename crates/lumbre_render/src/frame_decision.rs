@@ -164,11 +164,12 @@ impl Decided {
     fn pass_lights(&self, pass: LitPass) -> PassLights {
         let (mut objects, mut entries) = (0, 0);
         let (mut lists, mut lights) = (HashSet::new(), HashSet::<u32>::new());
-        let (mut inverse_square, mut ranged) = (false, false);
+        let (mut inverse_square, mut shadowed, mut ranged) = (false, false, false);
         let (batches, classes) = (self.draws.of(pass), || self.draws.deferred_of(pass));
         let drawn = batches.iter().map(|batch| &batch.pipeline.variant);
         for variant in drawn.chain(classes().map(|(_, class)| &class.pipeline.variant)) {
             inverse_square |= variant.has(Feature::InverseSquareClusters);
+            shadowed |= variant.has(Feature::ShadowedClusters);
             ranged |= variant.has(Feature::RangedClusters);
         }
         let numbers: Vec<u32> = classes().map(|(number, _)| number).collect();
@@ -186,7 +187,11 @@ impl Decided {
             }
         }
         let set = &self.lights.set;
-        let of_clusters = [(inverse_square, set.inverse_square.all), (ranged, set.ranged.all)];
+        let of_clusters = [
+            (inverse_square, set.inverse_square.all),
+            (shadowed, set.shadowed.all),
+            (ranged, set.ranged.all),
+        ];
         let clustered: u32 = of_clusters.iter().filter(|(read, _)| *read).map(|(_, count)| count).sum();
         PassLights {
             objects,

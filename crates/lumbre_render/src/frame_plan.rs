@@ -145,6 +145,7 @@ pub struct FrameShape {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ShadowAtlas {
     pub view: wgpu::TextureView,
+    pub planes: wgpu::TextureView,
     pub stale: bool,
     pub pipelines: usize,
 }

@@ -11,7 +11,7 @@ use crate::mesh_buffers::{Attribute, GpuMesh, MeshBuffers};
 use crate::mirror_views::MirrorView;
 use crate::pipelines::Pipelines;
 use crate::shader::{Feature, Variant};
-use crate::shadows::ShadowMaps;
+use crate::shadows::{BLOCK, ShadowMaps};
 use crate::view_buffers::{FrameGroup, ViewBuffers};
 
 /// The attributes of a shape with its normals.
@@ -104,6 +104,20 @@ impl<'a> FrameScene<'a> {
                 // A run has at most as many casters as there are objects, fewer than 2^24.
                 pass.draw_indexed(0..slices.count, 0, first..first + run.len() as u32);
             }
+        }
+    }
+
+    /// Draws the planes of the shadow maps that changed.
+    pub(crate) fn draw_shadow_planes(&self, pass: &mut wgpu::RenderPass<'static>) {
+        let Some(maps) = self.shadows.device() else { return };
+        let (Some(group), Some(pipelines)) = (&maps.planes_group, self.shadows.pipelines()) else { return };
+        pass.set_bind_group(0, group, &[]);
+        pass.set_pipeline(&pipelines.planes);
+        for map in &self.shadows.stale {
+            let [x, y, side] = map.place.map(|texels| texels / BLOCK);
+            pass.set_viewport(x as f32, y as f32, side as f32, side as f32, 0.0, 1.0);
+            pass.set_scissor_rect(x, y, side, side);
+            pass.draw(0..3, 0..1);
         }
     }
 

@@ -355,7 +355,8 @@ pub(crate) struct ClusterGridData {
     pub logarithmic: u32,
     pub first_baked_inverse_square: u32,
     pub first_baked_ranged: u32,
-    pub padding: [u32; 2],
+    pub shadowed_offsets: u32,
+    pub first_baked_shadowed: u32,
 }
 
 #[cfg(test)]

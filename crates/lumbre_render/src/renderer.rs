@@ -8,7 +8,7 @@ use std::time::Instant;
 use bevy_ecs::prelude::*;
 use lumbre_graph::{Executor, Plan};
 use lumbre_optics::{ErrorBound, Shading};
-use lumbre_scene::{SceneSettings, propagate_transforms};
+use lumbre_scene::{SceneSettings, ShadowFilter, propagate_transforms};
 
 use crate::accounting::FrameShares;
 use crate::draws::{Draws, VisibleObjects};
@@ -404,8 +404,13 @@ impl Renderer {
             shadows: options.shadows,
         });
         let by_need = is_shaded_by_need(&self.objects.census, options, settings);
-        let place =
-            LightPlace { origin: self.objects.origin, known, lamps: by_need, settings: settings.frame };
+        let place = LightPlace {
+            origin: self.objects.origin,
+            known,
+            lamps: by_need,
+            shadows: options.shadows,
+            settings: settings.frame,
+        };
         let mut lights = extract_lights(
             world,
             (&mut self.emitters, &mut self.light_records),
@@ -640,7 +645,8 @@ impl Renderer {
             let resolution = decided.decision.settings.frame.shadow_resolution();
             let reflected = mirrors.iter().map(|mirror| mirror.view).collect();
             let height = seen.target.height;
-            let view = ShadowedView { view: seen.view, reflected, height, depths, resolution };
+            let planes = decided.decision.settings.frame.shadow_filter != ShadowFilter::Hard;
+            let view = ShadowedView { view: seen.view, reflected, height, depths, resolution, planes };
             self.shadows.plan(&lights.shadows, &self.objects, &view);
         }
         clock.lap(|cpu| &mut cpu.shadows_ms);
@@ -688,6 +694,7 @@ impl Renderer {
             tile_side: if clustered { clusters.tile_side } else { 0 },
             entries: if clustered { clusters.entries } else { 0 },
             inverse_square_lights: lights.set.inverse_square.all,
+            shadowed_lights: lights.set.shadowed.all,
             other_ranged_lights: lights.set.ranged.all,
             unbounded_lights: lights.set.unbounded.all,
         };
@@ -725,7 +732,12 @@ impl Renderer {
         if let Some(maps) = self.shadows.device().filter(|_| !decided.lights.shadows.is_empty()) {
             let stale = !self.shadows.stale.is_empty();
             let pipelines = self.shadows.pipelines().map_or(0, CasterPipelines::count);
-            shape.shadow_atlas = Some(ShadowAtlas { view: maps.atlas_view.clone(), stale, pipelines });
+            shape.shadow_atlas = Some(ShadowAtlas {
+                view: maps.atlas_view.clone(),
+                planes: maps.planes.clone(),
+                stale,
+                pipelines,
+            });
         }
         shape.mirrors = Some(decided.mirrors.iter().map(|mirror| mirror.shape(shape.size)).collect());
         shape.refractors = self.refractors(decided, &frame.view);

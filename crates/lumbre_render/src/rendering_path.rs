@@ -55,7 +55,7 @@ impl ChosenPath {
         let lit_by_pixel = matches!(shading, Shading::Phong | Shading::Auto { .. }) && !filtered;
         let (triangles, lightmapped) = (objects.triangles, objects.lightmapped);
         let clustered = match lights.are_clustered(options.light_lists) {
-            true => lights.inverse_square.all + lights.ranged.all,
+            true => lights.with_range(),
             false => 0,
         };
         let (enough, most) = match software {

@@ -6,8 +6,13 @@ use glam::DVec3;
 use lumbre_optics::{Light, LightKind};
 use lumbre_scene::GlobalTransform;
 
+use crate::layout::InverseSquareLightData;
+
 /// Largest number of views of all lights of a frame.
 pub(crate) const MAX_VIEWS: usize = 128;
+/// Number of the compact record that is black, whatever lights there are: as many lights as there can be come
+/// before it.
+pub(crate) const BLACK_SHADOWED: u32 = MAX_VIEWS as u32;
 /// Number of cascades of a directional light.
 pub(crate) const CASCADES: usize = 3;
 /// A spotlight with a larger half angle than this, in radians, has six views like a point light.
@@ -57,6 +62,8 @@ pub(crate) struct ShadowLight {
     pub range: f64,
     /// Radius in metres; for a directional light the tangent of half its angle.
     pub size: f64,
+    /// Its record, if its class has compact ones.
+    pub compact: Option<InverseSquareLightData>,
 }
 
 impl ShadowLight {
@@ -84,6 +91,7 @@ impl ShadowLight {
             cone,
             range: f64::from(light.attenuation.range),
             size,
+            compact: None,
         })
     }
 

@@ -149,6 +149,8 @@ pub struct LightListing {
     pub inverse_square_lights: u32,
     /// Other lights with a range: with a cone, a different attenuation or several colours.
     pub other_ranged_lights: u32,
+    /// Lights in the clusters' lists that are like inverse-square ones, and cast a shadow.
+    pub shadowed_lights: u32,
     /// Lights without a range, directional lights and polygon lights. These are always in the lists of
     /// objects.
     pub unbounded_lights: u32,

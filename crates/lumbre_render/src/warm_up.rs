@@ -15,7 +15,7 @@ use crate::g_buffer;
 use crate::irradiance_volumes;
 use crate::pipelines::{Afterwards, Pipeline, PipelineKey, Pipelines};
 use crate::shader::Feature;
-use crate::shadows::CasterPipelines;
+use crate::shadows::{CasterPipelines, PLANES_FORMAT};
 use crate::target::DEPTH_FORMAT;
 use crate::texture_sets::{TextureSet, TextureSets};
 use crate::textures::Textures;
@@ -180,6 +180,17 @@ impl WarmUp {
         pass.set_index_buffer(self.zeros.slice(..), wgpu::IndexFormat::Uint32);
         pass.draw_indexed(0..3, 0, 0..1);
         drop(pass);
+        let planes = self.texture(PLANES_FORMAT, 1);
+        let group = pipelines.planes_group(device, &map);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("warm-up"),
+            color_attachments: &[Some(color_attachment(&planes))],
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &group, &[]);
+        pass.set_pipeline(&pipelines.planes);
+        pass.draw(0..3, 0..1);
+        drop(pass);
         self.finish(encoder)
     }
 
@@ -220,7 +231,9 @@ impl WarmUp {
             sample_count,
             dimension: wgpu::TextureDimension::D2,
             format,
-            usage: match (format == DEPTH_FORMAT || format == g_buffer::FORMAT) && sample_count == 1 {
+            usage: match [DEPTH_FORMAT, g_buffer::FORMAT, PLANES_FORMAT].contains(&format)
+                && sample_count == 1
+            {
                 true => wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
                 false => wgpu::TextureUsages::RENDER_ATTACHMENT,
             },
@@ -300,12 +313,15 @@ impl WarmUp {
     fn shadow_group(&self) -> wgpu::BindGroup {
         let atlas = self.texture(DEPTH_FORMAT, 1);
         let table = self.texture(wgpu::TextureFormat::Rgba32Uint, 1);
+        let planes = self.texture(PLANES_FORMAT, 1);
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("warm-up"),
             layout: self.pipelines.shadow_layout(),
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&atlas) },
                 wgpu::BindGroupEntry { binding: 1, resource: self.table(&table) },
+                wgpu::BindGroupEntry { binding: 2, resource: self.zeros.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 3, resource: wgpu::BindingResource::TextureView(&planes) },
             ],
         })
     }

@@ -17,8 +17,10 @@ pub(crate) enum LightClass {
     /// inverse square within a range, with or without a constant term. Most lights of a game are of this
     /// class.
     InverseSquare,
-    /// Any other point light with a range: with a shadow, OpenGL's cone, a linear attenuation term, or
-    /// different colours.
+    /// A light that would be of this class, but casts a shadow.
+    Shadowed,
+    /// Any other point light with a range: with OpenGL's cone, a linear attenuation term, or different
+    /// colours.
     Ranged,
 }
 
@@ -36,9 +38,18 @@ impl LightClass {
         let narrowed = cone(light).is_some_and(|cone| !matches!(cone, SpotCone::Smooth { .. }));
         // The range that `attenuate_quadratic` supports.
         let usual_range = (1e-9..=1e15).contains(&range);
-        match inverse_square && one_color && !narrowed && usual_range && !light.shadow {
-            true => Self::InverseSquare,
-            false => Self::Ranged,
+        match (inverse_square && one_color && !narrowed && usual_range, light.shadow) {
+            (true, false) => Self::InverseSquare,
+            (true, true) => Self::Shadowed,
+            (false, _) => Self::Ranged,
+        }
+    }
+
+    /// Returns the class in frames with or without shadows.
+    pub(super) fn in_frames(self, shadows: bool) -> Self {
+        match self {
+            Self::Shadowed if !shadows => Self::InverseSquare,
+            class => class,
         }
     }
 }
@@ -202,14 +213,17 @@ mod tests {
             Light { spot: cone, ..lamp.clone() },
             Light { ambient: Vec3::X, ..lamp.clone() },
             Light { specular: Vec3::ZERO, ..lamp.clone() },
-            Light { shadow: true, ..lamp.clone() },
             Light { attenuation: linear, ..lamp.clone() },
             Light { attenuation: faint, ..lamp.clone() },
             Light { attenuation: clamped, ..lamp.clone() },
             Light { attenuation: tiny, ..lamp.clone() },
         ] {
             assert_eq!(LightClass::of(&other), LightClass::Ranged, "{other:?}");
+            assert_eq!(LightClass::of(&Light { shadow: true, ..other }), LightClass::Ranged);
         }
+        let shadowed = LightClass::of(&Light { shadow: true, ..lamp.clone() });
+        assert_eq!(shadowed, LightClass::Shadowed);
+        assert_eq!([true, false].map(|on| shadowed.in_frames(on)), [shadowed, LightClass::InverseSquare]);
         for other in [Light::point(Vec3::ONE), Light { kind: LightKind::Directional, ..lamp }] {
             assert_eq!(LightClass::of(&other), LightClass::Unbounded, "{other:?}");
         }

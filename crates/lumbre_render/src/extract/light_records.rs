@@ -25,15 +25,15 @@ pub(super) struct LightRecord {
     pub reach: LightReach,
     /// Without the flags of its shadow.
     pub data: LightData,
-    /// Set for an inverse-square light.
+    /// Set for an inverse-square light, with a shadow or without.
     pub inverse_square: Option<InverseSquareLightData>,
 }
 
 impl LightRecord {
     pub fn new(entity: Entity, light: Light, place: GlobalTransform, origin: DVec3) -> Self {
         let class = LightClass::of(&light);
-        let inverse_square =
-            (class == LightClass::InverseSquare).then(|| InverseSquareLightData::new(&light, &place, origin));
+        let inverse_square = matches!(class, LightClass::InverseSquare | LightClass::Shadowed)
+            .then(|| InverseSquareLightData::new(&light, &place, origin));
         let reach = LightReach::new(&light, &place, class);
         Self { entity, data: LightData::new(&light, &place, origin), reach, inverse_square, light, place }
     }

@@ -66,7 +66,10 @@ pub(crate) struct LightSet {
     pub every: LightCounts,
     pub unbounded: LightCounts,
     pub inverse_square: LightCounts,
+    pub shadowed: LightCounts,
     pub ranged: LightCounts,
+    /// Number of shadow views of the lights so far.
+    shadow_views: usize,
 }
 
 impl LightCounts {
@@ -114,11 +117,11 @@ impl LightCounts {
 }
 
 impl LightSet {
-    /// Counts the lights of a World.
+    /// Counts the lights of a World, for frames with or without shadows.
     ///
     /// # Errors
     /// [`RenderError::TooManyEmissiveFaces`].
-    pub fn of(world: &mut World) -> Result<Self, RenderError> {
+    pub fn of(world: &mut World, shadows: bool) -> Result<Self, RenderError> {
         let mut set = Self::default();
         Emitters::default().polygons(world)?.iter().for_each(|polygon| set.add_polygon(polygon));
         let settings = frame_settings(world);
@@ -134,32 +137,38 @@ impl LightSet {
             .collect();
         found.sort_by_key(|light| light.bake == BakeMode::Static);
         for light in &found {
-            set.add(light, LightClass::of(light));
+            set.add(light, LightClass::of(light).in_frames(shadows));
         }
-        Ok(set)
+        Ok(if shadows { set } else { set.without_shadows() })
     }
 
     /// Returns the counts with lightmaps switched off, so that no light counts as baked.
     pub fn without_lightmaps(mut self) -> Self {
-        for counts in [&mut self.every, &mut self.unbounded, &mut self.inverse_square, &mut self.ranged] {
-            counts.dynamic = counts.all;
-        }
+        self.every_class().for_each(|counts| counts.dynamic = counts.all);
         self
     }
 
     /// Returns the counts with shadows switched off.
     pub fn without_shadows(mut self) -> Self {
-        for counts in [&mut self.every, &mut self.unbounded, &mut self.inverse_square, &mut self.ranged] {
-            counts.shadows = ShadowCounts::default();
-        }
+        self.every_class().for_each(|counts| counts.shadows = ShadowCounts::default());
         self
+    }
+
+    fn every_class(&mut self) -> impl Iterator<Item = &mut LightCounts> {
+        let Self { every, unbounded, inverse_square, shadowed, ranged, .. } = self;
+        [every, unbounded, inverse_square, shadowed, ranged].into_iter()
+    }
+
+    /// Returns the number of lights that clusters can list.
+    pub fn with_range(&self) -> u32 {
+        self.inverse_square.all + self.shadowed.all + self.ranged.all
     }
 
     /// Returns true if fragments find lights with a range by clusters. With few lights, the lists of objects
     /// are just as short.
     pub fn are_clustered(&self, lists: LightLists) -> bool {
         match lists {
-            LightLists::Auto => self.inverse_square.all + self.ranged.all >= CLUSTERED_LIGHTS,
+            LightLists::Auto => self.with_range() >= CLUSTERED_LIGHTS,
             LightLists::Clusters => true,
             LightLists::Objects | LightLists::Everything => false,
         }
@@ -169,15 +178,16 @@ impl LightSet {
     /// list. `clustered` of `objects` objects have fragments that use clusters.
     pub fn listing(&self, lists: LightLists, clustered: usize, objects: usize) -> Vec<String> {
         let (every, inverse_square, ranged) = (self.every.all, self.inverse_square.all, self.ranged.all);
+        let (with_range, shadowed) = (self.with_range(), self.shadowed.all);
         if every == 0 {
             return vec!["none: the scene has no lights but ambient ones".to_owned()];
         }
         let mut lines = Vec::new();
-        let with_range = inverse_square + ranged;
         if clustered > 0 {
             lines.push(format!(
                 "clusters: {with_range} lights with a range ({CLUSTERED_LIGHTS} are enough), for the fragments of {clustered} \
-                 objects under Phong shading: {inverse_square} inverse-square ones of one colour in lean records, {ranged} others"
+                 objects under Phong shading: {inverse_square} inverse-square ones of one colour in lean records, {shadowed} such \
+                 lights with a shadow, {ranged} others"
             ));
         }
         let why = match (lists, self.are_clustered(lists), clustered) {
@@ -215,7 +225,11 @@ impl LightSet {
             return None;
         }
         self.every.add(light);
+        let views = ShadowKind::of(light).filter(|_| light.shadow).map_or(0, ShadowKind::views);
+        let has_room = self.shadow_views + views <= MAX_VIEWS;
+        self.shadow_views += if has_room { views } else { 0 };
         let class = match class {
+            LightClass::Shadowed if !has_room => LightClass::Ranged,
             LightClass::InverseSquare if self.inverse_square.all as usize == NUMBERED_LIGHTS => {
                 LightClass::Ranged
             }
@@ -224,6 +238,7 @@ impl LightSet {
         let counts = match class {
             LightClass::Unbounded => &mut self.unbounded,
             LightClass::InverseSquare => &mut self.inverse_square,
+            LightClass::Shadowed => &mut self.shadowed,
             LightClass::Ranged => &mut self.ranged,
         };
         counts.add(light);
@@ -266,10 +281,11 @@ impl KnownLights<'_> {
                 own.shadows = ShadowCounts::default();
             }
             let baked = self.lightmaps && light.bake == BakeMode::Static;
-            let class = record.reach.class;
+            let class = record.reach.class.in_frames(self.shadows);
             let of_class = match class {
                 LightClass::Unbounded => &self.set.unbounded,
                 LightClass::InverseSquare => &self.set.inverse_square,
+                LightClass::Shadowed => &self.set.shadowed,
                 LightClass::Ranged => &self.set.ranged,
             };
             // The size of the uniform buffer is fixed.
@@ -357,6 +373,8 @@ pub(crate) struct LightPlace<'a> {
     pub known: Option<KnownLights<'a>>,
     /// Whether [`SceneLights::lamps`] are needed.
     pub lamps: bool,
+    /// Whether the frame has shadows.
+    pub shadows: bool,
     /// Settings for where lights end and whether their size matters.
     pub settings: FrameSettings,
 }
@@ -371,7 +389,7 @@ pub(crate) fn extract_lights(
     world: &mut World,
     (emitters, records): (&mut Emitters, &mut LightRecords),
     buffer: &mut GrowableBuffer<LightData>,
-    LightPlace { origin, known, lamps, settings }: LightPlace<'_>,
+    LightPlace { origin, known, lamps, shadows, settings }: LightPlace<'_>,
     left_out: &mut Vec<String>,
 ) -> Result<SceneLights, RenderError> {
     let mut scene = SceneLights::default();
@@ -392,7 +410,8 @@ pub(crate) fn extract_lights(
             };
             let Some(record) = shown.as_deref() else { continue };
             let LightRecord { entity, light, place, .. } = record;
-            let Some(class) = scene.set.add(light, record.reach.class) else { continue };
+            let class = record.reach.class.in_frames(shadows);
+            let Some(class) = scene.set.add(light, class) else { continue };
             if class == LightClass::InverseSquare {
                 scene.inverse_square.extend(record.inverse_square);
             }
@@ -401,7 +420,10 @@ pub(crate) fn extract_lights(
             if lamps {
                 scene.lamps.push(Lamp::new(light, place, reach));
             }
-            let shadow = ShadowLight::new(*entity, light, place, views);
+            let mut shadow = ShadowLight::new(*entity, light, place, views);
+            if let Some(shadow) = shadow.as_mut().filter(|_| class == LightClass::Shadowed) {
+                shadow.compact = record.inverse_square;
+            }
             if shadow.is_none() && light.shadow {
                 let name = world.get::<Name>(*entity).map_or_else(|| entity.to_string(), ToString::to_string);
                 left_out.push(format!(

@@ -104,6 +104,8 @@ features! {
     UniformLights = 37 => "UNIFORM_LIGHTS",
     /// Loops over a cluster's other lights with a range.
     RangedClusters = 38 => "RANGED_CLUSTERS",
+    /// Loops over a cluster's inverse-square lights that cast a shadow.
+    ShadowedClusters = 60 => "SHADOWED_CLUSTERS",
     /// Samples a normal map.
     NormalTexture = 39 => "NORMAL_TEXTURE",
     /// Samples an occlusion texture.
@@ -132,7 +134,7 @@ features! {
     Lights = 51 => "LIGHTS",
     /// Has the same colour everywhere, which the vertex stage computes.
     Constant = 52 => "CONSTANT",
-    /// Some of a cluster's inverse-square lights have a cone.
+    /// Some of a cluster's inverse-square lights, with a shadow or without, have a cone.
     InverseSquareSpots = 53 => "INVERSE_SQUARE_SPOTS",
     /// Samples an irradiance volume.
     IrradianceVolume = 54 => "IRRADIANCE_VOLUME",
@@ -185,6 +187,7 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::InverseSquareClusters as u64
     | Feature::UniformLights as u64
     | Feature::RangedClusters as u64
+    | Feature::ShadowedClusters as u64
     | Feature::InverseSquareSpots as u64
     | Feature::Display as u64
     | Feature::DisplaySrgb as u64
@@ -286,6 +289,7 @@ impl Variant {
             let keep = !(Feature::DynamicLights as u64
                 | Feature::StaticLights as u64
                 | Feature::InverseSquareClusters as u64
+                | Feature::ShadowedClusters as u64
                 | Feature::RangedClusters as u64
                 | Feature::LocalViewer as u64
                 | Feature::TwoSided as u64
@@ -302,13 +306,20 @@ impl Variant {
             self.bits &= !(Feature::SpecularAntialiasing as u64
                 | Feature::NormalTexture as u64
                 | Feature::InverseSquareClusters as u64
+                | Feature::ShadowedClusters as u64
                 | Feature::RangedClusters as u64);
         }
-        let clusters = self.has(Feature::InverseSquareClusters) || self.has(Feature::RangedClusters);
+        let shadowed = self.has(Feature::ShadowedClusters);
+        self.set(Feature::Shadows, shadowed);
+        let clusters =
+            self.has(Feature::InverseSquareClusters) || shadowed || self.has(Feature::RangedClusters);
         self.bits &= !(Feature::Clusters as u64);
         self.set(Feature::Clusters, clusters);
         if !self.has(Feature::InverseSquareClusters) {
-            self.bits &= !(Feature::UniformLights as u64 | Feature::InverseSquareSpots as u64);
+            self.bits &= !(Feature::UniformLights as u64);
+        }
+        if !self.has(Feature::InverseSquareClusters) && !shadowed {
+            self.bits &= !(Feature::InverseSquareSpots as u64);
         }
         let listed = self.has(Feature::DynamicLights) || self.has(Feature::StaticLights);
         if !listed && !self.has(Feature::RangedClusters) {
@@ -318,11 +329,12 @@ impl Variant {
                 | Feature::SpotLights as u64
                 | Feature::PolygonLights as u64);
         }
-        if !self.has(Feature::Shadows) || !listed && !self.has(Feature::RangedClusters) {
+        if !self.has(Feature::Shadows) || !listed && !shadowed && !self.has(Feature::RangedClusters) {
             self.bits &= !(Feature::Shadows as u64
                 | Feature::ShadowCubes as u64
                 | Feature::ShadowCascades as u64
-                | Feature::SoftShadows as u64);
+                | Feature::SoftShadows as u64
+                | Feature::HardShadows as u64);
         }
         self.bits &= !(Feature::Lights as u64 | Feature::Constant as u64);
         self.set(Feature::Lights, listed || clusters);

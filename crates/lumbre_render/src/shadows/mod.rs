@@ -6,10 +6,11 @@ mod atlas;
 mod views;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat4, DVec3, DVec4, Mat4};
+use glam::{DMat3, DMat4, DVec3, DVec4, Mat4};
 
 use crate::extract::{CameraView, Object, Objects};
 use crate::growable_buffer::GrowableBuffer;
+use crate::layout::InverseSquareLightData;
 use crate::mesh_buffers::{Attribute, MeshBuffers, MeshKey};
 use crate::pending::Pending;
 use crate::shader::{self, TABLES_IN_TEXTURES};
@@ -19,6 +20,9 @@ use crate::{Gpu, RenderError, Uploads};
 
 /// Largest side of the atlas, in texels.
 const MAX_TEXELS: u32 = 4096;
+/// Format of the planes of maps, which have a texel for each block of the atlas of this side.
+pub(crate) const PLANES_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+pub(crate) const BLOCK: u32 = 4;
 /// Stride of records that are bound at a dynamic offset: the largest alignment that WebGPU may require.
 const STRIDE: usize = 256;
 
@@ -26,12 +30,54 @@ const STRIDE: usize = 256;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 struct ViewData {
-    map_from_frame: [[f32; 4]; 4],
-    /// Corner and side in the atlas, and the size of a texel, all relative to the atlas.
+    /// Of an orthographic view, the transform of frame space to the coordinates of the map and its depth; of a
+    /// perspective one its directions to the right, up and forward.
+    axes: [[f32; 4]; 4],
+    /// Corner and side in the atlas, in texels; 0.
     tile: [f32; 4],
     /// Size of a texel in metres (in a perspective view at a distance of one metre), near plane or negative
     /// depth range, size of the light, end of a cascade.
     parameters: [f32; 4],
+}
+
+/// `ShadowedLight` of shaders/shadows.wesl: a light with a compact record, and the views of its shadow.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+struct ShadowedLightData {
+    light: InverseSquareLightData,
+    /// Of a cone, the directions of its view to the right, up and forward; of a cube, the corners of its maps,
+    /// in texels, two in each. A corner is negative if there is no map.
+    axes_or_corners: [[f32; 4]; 3],
+    /// Corner of a cone's map; side of all its maps in texels; 1 for a cone, 2 for a cube, 0 for none.
+    tile: [f32; 4],
+    parameters: [f32; 4],
+}
+
+impl ShadowedLightData {
+    /// Creates the record of a light with these views.
+    fn new(light: InverseSquareLightData, kind: ShadowKind, views: &[ViewData]) -> Self {
+        // All maps of a light are equally large.
+        let placed = views.iter().find(|view| view.tile[2] > 0.0);
+        let Some(ViewData { axes, tile: [x, y, side, _], parameters }) = placed.copied() else {
+            return Self { light, ..Self::zeroed() };
+        };
+        let mut axes_or_corners = [[-1.0; 4]; 3];
+        match kind {
+            ShadowKind::Cube => {
+                for (view, place) in views.iter().zip(axes_or_corners.as_flattened_mut().chunks_exact_mut(2))
+                {
+                    if view.tile[2] > 0.0 {
+                        place.copy_from_slice(&view.tile[..2]);
+                    }
+                }
+            }
+            ShadowKind::Cone | ShadowKind::Cascades => {
+                axes_or_corners.copy_from_slice(&axes[..3]);
+            }
+        }
+        let kind = if kind == ShadowKind::Cube { 2.0 } else { 1.0 };
+        Self { light, axes_or_corners, tile: [x, y, side, kind], parameters }
+    }
 }
 
 /// A caster to draw in a view.
@@ -64,6 +110,8 @@ pub(crate) struct ShadowedView {
     pub depths: [f64; 2],
     /// Factor on the default side of the maps.
     pub resolution: f32,
+    /// Whether the maps' planes are read.
+    pub planes: bool,
 }
 
 /// The shadow maps of a renderer.
@@ -73,17 +121,24 @@ pub(crate) struct ShadowMaps {
     drawn: Vec<u64>,
     pub stale: Vec<StaleMap>,
     views: GrowableBuffer<ViewData>,
+    /// The lights with a compact record. The buffer has room for a black one after as many as there can be,
+    /// which is never written.
+    lights: GrowableBuffer<ShadowedLightData>,
     matrices: Vec<u8>,
     casters: Option<Pending<CasterPipelines>>,
     device: Option<OnDevice>,
     /// Side of the next atlas, in texels.
     side: u32,
+    /// Whether the maps' planes are drawn, too.
+    planes: bool,
 }
 
-/// The pipelines that draw casters into a map.
+/// The pipelines that draw casters into a map, and the map's planes.
 #[derive(Debug)]
 pub(crate) struct CasterPipelines {
     layout: wgpu::BindGroupLayout,
+    planes_layout: wgpu::BindGroupLayout,
+    pub planes: wgpu::RenderPipeline,
     pub caster: wgpu::RenderPipeline,
     pub clear: wgpu::RenderPipeline,
 }
@@ -91,7 +146,7 @@ pub(crate) struct CasterPipelines {
 impl CasterPipelines {
     /// Returns the number of pipelines.
     pub fn count(&self) -> usize {
-        [&self.caster, &self.clear].len()
+        [&self.caster, &self.clear, &self.planes].len()
     }
 }
 
@@ -100,6 +155,9 @@ impl CasterPipelines {
 pub(crate) struct OnDevice {
     pub atlas: wgpu::Texture,
     pub atlas_view: wgpu::TextureView,
+    /// The planes of the maps.
+    pub planes: wgpu::TextureView,
+    pub planes_group: Option<wgpu::BindGroup>,
     matrices: wgpu::Buffer,
     pub caster_group: Option<wgpu::BindGroup>,
     pub receiver_group: Option<wgpu::BindGroup>,
@@ -111,10 +169,12 @@ impl ShadowMaps {
             drawn: Vec::new(),
             stale: Vec::new(),
             views: GrowableBuffer::table("shadow views"),
+            lights: GrowableBuffer::uniform("lights with a shadow", MAX_VIEWS + 1),
             matrices: Vec::new(),
             casters: None,
             device: None,
             side: 0,
+            planes: false,
         }
     }
 
@@ -160,6 +220,7 @@ impl ShadowMaps {
             true => (0.5 * (low + high), 0.5 * (high - low).length()),
             false => (DVec3::ZERO, 1.0),
         };
+        let planes = seen.planes;
         let seen = views::Seen {
             view: seen.view,
             reflected: seen.reflected.clone(),
@@ -182,8 +243,8 @@ impl ShadowMaps {
         }
         let wanted: Vec<f64> = found.iter().map(|(_, view)| view.wanted).collect();
         let (side, tiles) = atlas::pack(&wanted, seen.most_texels(), MAX_TEXELS);
-        if side != self.side {
-            self.side = side;
+        if (side, planes) != (self.side, self.planes) {
+            (self.side, self.planes) = (side, planes);
             self.drawn.clear();
         }
         self.drawn.resize(found.len(), 0);
@@ -196,9 +257,7 @@ impl ShadowMaps {
                 data.push(ViewData::default());
                 continue;
             };
-            let part = 1.0 / f64::from(side);
-            let place =
-                [f64::from(tile.x) * part, f64::from(tile.y) * part, f64::from(tile.side) * part, part];
+            let place = [f64::from(tile.x), f64::from(tile.y), f64::from(tile.side), 0.0];
             let parameters = [view.width / f64::from(tile.side), view.near_or_depth, light.size, view.end];
             // From clip space to the map's coordinates, which are [0, 1] with y downwards.
             let map_from_clip = DMat4::from_cols(
@@ -208,8 +267,13 @@ impl ShadowMaps {
                 DVec4::new(0.5, 0.5, 0.0, 1.0),
             );
             let clip_from_frame = view.clip_from_frame.as_mat4();
+            let [right, up, forward] = [view.basis.x_axis, view.basis.y_axis, -view.basis.z_axis];
+            let axes = match light.kind {
+                ShadowKind::Cascades => (map_from_clip * view.clip_from_frame).transpose(),
+                ShadowKind::Cone | ShadowKind::Cube => DMat4::from_mat3(DMat3::from_cols(right, up, forward)),
+            };
             data.push(ViewData {
-                map_from_frame: (map_from_clip * view.clip_from_frame).as_mat4().to_cols_array_2d(),
+                axes: axes.as_mat4().to_cols_array_2d(),
                 tile: place.map(|number| number as f32),
                 parameters: parameters.map(|number| number as f32),
             });
@@ -224,6 +288,14 @@ impl ShadowMaps {
                 self.stale.push(StaleMap { place: [tile.x, tile.y, tile.side], matrix_offset, casters });
             }
         }
+        let mut views = data.as_slice();
+        let compact = lights.iter().filter_map(|light| {
+            let (own, others) = views.split_at(light.views().min(views.len()));
+            views = others;
+            Some(ShadowedLightData::new(light.compact?, light.kind, own))
+        });
+        // There is a buffer to bind even if no light has such a record.
+        self.lights.replace(compact.chain([ShadowedLightData::zeroed()]).take(MAX_VIEWS));
         self.views.replace(data);
     }
 
@@ -243,19 +315,22 @@ impl ShadowMaps {
             let side = self.side.min(gpu.device.limits().max_texture_dimension_2d);
             self.device = Some(OnDevice::new(gpu, side));
         }
-        let shadows = self.views.pending_bytes() + self.matrices.len() as u64;
+        let shadows = self.views.pending_bytes() + self.lights.pending_bytes() + self.matrices.len() as u64;
         let mut uploads = Uploads { shadows, ..Uploads::default() };
-        let renewed = self.views.upload(gpu)?;
+        let renewed = self.views.upload(gpu)? | self.lights.upload(gpu)?;
         let Some(device) = &mut self.device else { return Ok(uploads) };
         if !self.matrices.is_empty() {
             gpu.queue.write_buffer(&device.matrices, 0, &self.matrices);
         }
         if renewed || device.receiver_group.is_none() {
-            device.receiver_group = self.views.bound().map(|views| device.receivers(gpu, views, layout));
+            let bound = self.views.bound().zip(self.lights.buffer());
+            device.receiver_group = bound.map(|(views, lights)| device.receivers(gpu, views, lights, layout));
         }
         let pipelines = self.casters.as_ref().and_then(|casters| casters.get()?.ok());
         device.caster_group =
             pipelines.map(|pipelines| pipelines.group(&gpu.device, objects, &device.matrices));
+        device.planes_group =
+            pipelines.map(|pipelines| pipelines.planes_group(&gpu.device, &device.atlas_view));
         for caster in self.stale.iter().flat_map(|map| &map.casters) {
             if let Some(mesh) = meshes.get_mut(caster.mesh) {
                 uploads.meshes += mesh.prepare(gpu, &[Attribute::Position], None);
@@ -348,6 +423,12 @@ impl Hash {
     }
 }
 
+const ATLAS_BINDING: wgpu::BindingType = wgpu::BindingType::Texture {
+    sample_type: wgpu::TextureSampleType::Depth,
+    view_dimension: wgpu::TextureViewDimension::D2,
+    multisampled: false,
+};
+
 /// Creates the layout of the group that surfaces read shadows from.
 pub(crate) fn receiver_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
@@ -356,15 +437,20 @@ pub(crate) fn receiver_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
         ty,
         count: None,
     };
-    let atlas = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Depth,
+    let views = table_binding(gpu.reads_tables_from_textures());
+    let planes = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: false },
         view_dimension: wgpu::TextureViewDimension::D2,
         multisampled: false,
     };
-    let views = table_binding(gpu.reads_tables_from_textures());
+    let lights = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("shadows"),
-        entries: &[entry(0, atlas), entry(1, views)],
+        entries: &[entry(0, ATLAS_BINDING), entry(1, views), entry(2, lights), entry(3, planes)],
     })
 }
 
@@ -386,6 +472,13 @@ impl CasterPipelines {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("shadow casters"),
             entries: &[entry(0, table), entry(1, matrix)],
+        });
+        let planes_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("shadow planes"),
+            entries: &[wgpu::BindGroupLayoutEntry {
+                visibility: wgpu::ShaderStages::FRAGMENT,
+                ..entry(0, ATLAS_BINDING)
+            }],
         });
         let flags = [(TABLES_IN_TEXTURES, tables_in_textures)];
         let module = shader::compile(device, "shadow_caster", &flags)?;
@@ -428,10 +521,22 @@ impl CasterPipelines {
             caster: make("caster", &positions, wgpu::CompareFunction::Greater),
             clear: make("clear", &[], wgpu::CompareFunction::Always),
             layout,
+            planes: planes_pipeline(device, &planes_layout)?,
+            planes_layout,
         })
     }
 
-    /// Creates their bind group: the table of objects, and a matrix at a dynamic offset.
+    /// Creates the bind group of the planes.
+    pub fn planes_group(&self, device: &wgpu::Device, atlas: &wgpu::TextureView) -> wgpu::BindGroup {
+        let resource = wgpu::BindingResource::TextureView(atlas);
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("shadow planes"),
+            layout: &self.planes_layout,
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource }],
+        })
+    }
+
+    /// Creates the casters' bind group: the table of objects, and a matrix at a dynamic offset.
     pub fn group(
         &self,
         device: &wgpu::Device,
@@ -450,6 +555,40 @@ impl CasterPipelines {
     }
 }
 
+fn planes_pipeline(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+) -> Result<wgpu::RenderPipeline, RenderError> {
+    const NAME: &str = "shadow_planes";
+    let module = shader::compile(device, NAME, &[])?;
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(NAME),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    Ok(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(NAME),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: Default::default(),
+        depth_stencil: None,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &[Some(PLANES_FORMAT.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    }))
+}
+
 impl OnDevice {
     fn new(gpu: &Gpu, side: u32) -> Self {
         let device = &gpu.device;
@@ -463,6 +602,17 @@ impl OnDevice {
             usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
             view_formats: &[],
         });
+        let side = side.div_ceil(BLOCK);
+        let planes = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("shadow planes"),
+            size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: PLANES_FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
         let matrices = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("shadow matrices"),
             size: (MAX_VIEWS * STRIDE) as u64,
@@ -473,6 +623,8 @@ impl OnDevice {
             atlas_view: atlas.create_view(&Default::default()),
             atlas,
             matrices,
+            planes: planes.create_view(&Default::default()),
+            planes_group: None,
             caster_group: None,
             receiver_group: None,
         }
@@ -482,13 +634,19 @@ impl OnDevice {
         &self,
         gpu: &Gpu,
         views: wgpu::BindingResource<'_>,
+        lights: &wgpu::Buffer,
         layout: &wgpu::BindGroupLayout,
     ) -> wgpu::BindGroup {
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("shadows"),
             layout,
-            entries: &[entry(0, wgpu::BindingResource::TextureView(&self.atlas_view)), entry(1, views)],
+            entries: &[
+                entry(0, wgpu::BindingResource::TextureView(&self.atlas_view)),
+                entry(1, views),
+                entry(2, lights.as_entire_binding()),
+                entry(3, wgpu::BindingResource::TextureView(&self.planes)),
+            ],
         })
     }
 }

@@ -19,6 +19,8 @@ const FARTHEST: f64 = 2000.0;
 pub(super) struct View {
     /// Transforms frame space to the view's clip space, reversed-Z.
     pub clip_from_frame: DMat4,
+    /// The directions to the right, up, and backward.
+    pub basis: DMat3,
     /// Width of the visible part of the world in metres; for a perspective view at a distance of one metre.
     pub width: f64,
     /// Near plane of a perspective view in metres, or the negative depth range of an orthographic one.
@@ -111,9 +113,10 @@ fn wanted(lamp: &Lamp, seen: &Seen) -> f64 {
 
 fn cone(lamp: &Lamp, seen: &Seen) -> View {
     let tangent = lamp.cone.clamp(1e-3, WIDEST_CONE).tan() * (1.0 + BORDER);
-    let clip_from_frame = perspective(tangent, NEAR) * view_from_frame(basis(lamp.axis), lamp.position);
+    let basis = basis(lamp.axis);
     View {
-        clip_from_frame,
+        clip_from_frame: perspective(tangent, NEAR) * view_from_frame(basis, lamp.position),
+        basis,
         width: 2.0 * tangent,
         near_or_depth: NEAR,
         end: f64::INFINITY,
@@ -122,10 +125,13 @@ fn cone(lamp: &Lamp, seen: &Seen) -> View {
 }
 
 fn cube(lamp: &Lamp, seen: &Seen) -> [View; 6] {
-    let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
     let tangent = 1.0 + BORDER;
-    axes.map(|axis| View {
-        clip_from_frame: perspective(tangent, NEAR) * view_from_frame(basis(axis), lamp.position),
+    // As `in_cube_view` in shaders/shadows.wesl chooses them. All sides are equally long.
+    let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z];
+    let faces = [[y, -z, -x], [y, z, x], [-z, x, -y], [z, x, y], [y, x, -z], [-y, x, z]];
+    faces.map(|[right, up, backward]| DMat3::from_cols(right, up, backward)).map(|basis| View {
+        clip_from_frame: perspective(tangent, NEAR) * view_from_frame(basis, lamp.position),
+        basis,
         width: 2.0 * tangent,
         near_or_depth: NEAR,
         end: f64::INFINITY,
@@ -173,6 +179,7 @@ fn cascades(lamp: &Lamp, seen: &Seen) -> Vec<View> {
             );
             View {
                 clip_from_frame: orthographic * view_from_frame(basis, eye),
+                basis,
                 width: 2.0 * half,
                 near_or_depth: -depth,
                 end: finish,
@@ -286,6 +293,9 @@ mod tests {
             let face = (0..3).find(|axis| direction[*axis].abs() == size).unwrap();
             let face = 2 * face + usize::from(direction[face] < 0.0);
             assert!(inside(&faces[face], cube.position + direction), "{direction} {face}");
+        }
+        for face in &faces {
+            assert_eq!(face.basis.determinant(), 1.0, "{:?}", face.basis);
         }
     }
 
