@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use lumbre_graph::Status;
 use lumbre_mesh::shapes;
 use lumbre_optics::{Light, LightKind, Material, Shading, SpotCone};
-use lumbre_render::{Display, FrameOptions, FrameReport, Offscreen, OffscreenFormat, Renderer};
+use lumbre_render::{Display, FrameOptions, FrameReport, LightLists, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{Camera, Mesh, Projection, Transform};
 
 use crate::adapter::gpu;
@@ -49,10 +49,15 @@ struct Drawn {
 }
 
 fn draw(renderer: &mut Renderer, world: &mut World, shading: Shading) -> Drawn {
+    draw_by(renderer, world, shading, LightLists::Auto)
+}
+
+fn draw_by(renderer: &mut Renderer, world: &mut World, shading: Shading, light_lists: LightLists) -> Drawn {
     let target = Offscreen::new(gpu(), SIZE, SIZE, OffscreenFormat::LinearFloat).unwrap();
     let options = FrameOptions {
         display: Display::Linear,
         shading: Some(shading),
+        light_lists,
         probe: true,
         ..FrameOptions::default()
     };
@@ -75,7 +80,7 @@ fn passes(point: DVec3, toward: DVec3, end: f64) -> f64 {
     (point + toward * along).distance(BALL)
 }
 
-fn every_light() -> [(&'static str, Light, DVec3); 5] {
+fn every_light() -> [(&'static str, Light, DVec3); 7] {
     let place = DVec3::new(1.2, 4.0, 0.7);
     let cone = SpotCone::Smooth { inner: 0.5, outer: 0.8 };
     let wide = SpotCone::Smooth { inner: 1.3, outer: 1.5 };
@@ -83,6 +88,8 @@ fn every_light() -> [(&'static str, Light, DVec3); 5] {
         ("spot", Light::spot(Vec3::splat(30.0), cone), place),
         ("wide spot", Light::spot(Vec3::splat(30.0), wide), place),
         ("point", Light::point(Vec3::splat(30.0)), place),
+        ("spot with a range", Light::spot(Vec3::splat(30.0), cone).with_range(12.0), place),
+        ("wide spot with a range", Light::spot(Vec3::splat(30.0), wide).with_range(12.0), place),
         ("point with a range", Light::point(Vec3::splat(30.0)).with_range(12.0), place),
         ("directional", Light::directional(Vec3::splat(2.0)), place),
     ]
@@ -90,14 +97,27 @@ fn every_light() -> [(&'static str, Light, DVec3); 5] {
 
 #[test]
 fn shadows_fall_where_rays_say() {
+    fall_where_rays_say(LightLists::Everything);
+}
+
+#[test]
+fn shadows_of_lamps_in_clusters_fall_where_rays_say() {
+    // Lamps with a range have compact records there.
+    assert_eq!(fall_where_rays_say(LightLists::Clusters), 3);
+}
+
+/// Compares the shadows of every kind of light with rays, and returns how many lamps had compact records.
+fn fall_where_rays_say(lists: LightLists) -> u32 {
     let mut renderer = Renderer::new(gpu());
+    let mut compact = 0;
     for (name, lamp, place) in every_light() {
         let mut world = floor();
         let ball = Mesh::from(shapes::uv_sphere(RADIUS as f32, 96, 48));
         world.spawn((ball, Material::matt(Vec3::ONE), Transform::from_translation(BALL)));
         let distant = lamp.kind == LightKind::Directional;
         light(&mut world, lamp, place, DVec3::ZERO);
-        let Drawn { lit, .. } = draw(&mut renderer, &mut world, Shading::Phong);
+        let Drawn { lit, report } = draw_by(&mut renderer, &mut world, Shading::Phong, lists);
+        compact += report.statistics.light_lists.shadowed_lights;
         let (mut dark, mut bright, mut near) = (0, 0, 0);
         for (index, lit) in lit.iter().enumerate() {
             let point = point(index);
@@ -128,6 +148,7 @@ fn shadows_fall_where_rays_say() {
         }
         assert!(dark > 300 && bright > 20_000, "{name}: {dark} dark, {near} near the edge, {bright} bright");
     }
+    compact
 }
 
 #[test]

@@ -28,7 +28,7 @@ fn kernel() -> Kernel {
             lit += select(0.0, 1.0, depth >= x[i32(in_block.y) * 6 + i32(in_block.x)]);
         }
         return array<f32, 2>(said, lit);";
-    let imports = ["package::depth_plane::{depth_plane", "with_texel", "side_of_plane}"];
+    let imports = ["package::depth_plane::{depth_plane, with_texel, side_of_plane}"];
     Kernel::new("depth_plane", &imports, &[], INPUTS, 2, call)
 }
 

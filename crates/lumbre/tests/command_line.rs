@@ -241,7 +241,8 @@ fn a_bake_is_loaded_explained_and_drawn() {
     let short = stdout(&lumbre(&["explain", text(&path)]));
     assert!(short.contains("+ meshes: 3 meshes to draw\n") && short.contains("--all"), "{short}");
     assert!(
-        short.lines().count() < 20 && short.contains("without linear frame, shadow maps, g-buffer, lightmap"),
+        short.lines().count() < 20
+            && short.contains("without linear frame, shadow maps, shadow planes, g-buffer, lightmap"),
         "{short}"
     );
     let measured = stdout(&lumbre(&["explain", text(&path), "--measure=0.1", "--size", "64x48"]));

@@ -22,7 +22,8 @@ pub(crate) struct SampleAllocation {
 }
 
 /// Variances and a goal for their sum, weighted such that each texel's variance falls to a share of its own when the
-/// sum reaches the goal.
+/// sum reaches the goal. Where all of it may be left, it does not count: what is good enough gets no samples because
+/// something else cannot be reached.
 pub(crate) struct WeightedGoal {
     /// Per covered texel, how much its variance counts.
     pub weights: Vec<f32>,
@@ -39,7 +40,8 @@ impl WeightedGoal {
         // Where the least worth of a sample is c, and a variance counts w times, it falls to (c / w)^(p / (1 + p)) of
         // what it would be for a worth and a weight of 1.
         let exponent = -((1.0 + order) / order) as f32;
-        let weights: Vec<f32> = shares.par_iter().map(|share| share.powf(exponent)).collect();
+        let weight = |&share: &f32| if share < 1.0 { share.powf(exponent) } else { 0.0 };
+        let weights: Vec<f32> = shares.par_iter().map(weight).collect();
         let variances: Vec<f32> =
             variances.par_iter().zip(&weights).map(|(variance, weight)| variance * weight).collect();
         let left = |texel: &CoveredTexel| f64::from(variances[texel.place()] * shares[texel.place()]);
@@ -220,11 +222,14 @@ mod tests {
         let (variances, shares) = ([1.0f32; 4], [1.0, 1.0, 0.125, 0.125]);
         let texels = CoveredTexel::all(4).collect::<Vec<_>>();
         let goal = WeightedGoal::new(&variances, &shares, &texels, 1.0);
-        assert_eq!((goal.weights[0], goal.weights[2]), (1.0, 64.0));
+        assert_eq!((goal.weights[0], goal.weights[2]), (0.0, 64.0));
         let allocated = allocator(&texels, &goal.variances, &[4; 4], 1024).reach(goal.sum);
         // Without weights, all four would get equally many.
         let wanted = |place| SampleAllocation { texel: CoveredTexel(place), samples: 32 };
         assert_eq!(allocated, [wanted(2), wanted(3)]);
+        // Out of reach: the others still get none.
+        let allocator = allocator(&texels, &goal.variances, &[4, 4, 1024, 4], 1024);
+        assert_eq!(allocator.reach(0.0), [wanted(3)]);
     }
 
     #[test]

@@ -41,9 +41,9 @@ const MIN_LIMITS: [LeastLimit; 4] = [
     (
         "max_sampled_textures_per_shader_stage",
         |limits| u64::from(limits.max_sampled_textures_per_shader_stage),
-        // Five textures of a material, one of baked light, the shadow atlas, and eight tables where these are
-        // textures.
-        15,
+        // Five textures of a material, one of baked light, the shadow atlas and its planes, and eight tables where
+        // these are textures.
+        16,
     ),
     ("max_uniform_buffer_binding_size", |limits| limits.max_uniform_buffer_binding_size, 1 << 16),
 ];

@@ -147,10 +147,11 @@ pub struct LightListing {
     pub entries: usize,
     /// Inverse-square lights of one colour, which have compact records.
     pub inverse_square_lights: u32,
-    /// Other lights with a range: with a cone, a different attenuation or several colours.
-    pub other_ranged_lights: u32,
-    /// Lights in the clusters' lists that are like inverse-square ones, and cast a shadow.
+    /// Inverse-square lights of one colour that cast a shadow, which have compact records, too.
     pub shadowed_lights: u32,
+    /// Other lights with a range: with OpenGL's cone, a different attenuation, several colours, or a shadow for which
+    /// there is no room.
+    pub other_ranged_lights: u32,
     /// Lights without a range, directional lights and polygon lights. These are always in the lists of
     /// objects.
     pub unbounded_lights: u32,

@@ -240,12 +240,18 @@ impl<'a> Paths<'a> {
         if total <= 0.0 {
             return Next::Ends;
         }
+        // A lamp's own bulb lets its light pass unturned, wherever it is sampled: it is not found once more in the bulb's
+        // glass.
+        let beyond = |lamp: &MetLamp| match self.scene.lights[lamp.number].bulbs.contains(&point.object) {
+            true => 0.0,
+            false => 1.0,
+        };
         let choice = numbers.next() * total;
         if let Some(split) = split.filter(|_| choice >= local) {
             return if choice < local + mirrored {
                 walk.throughput *= split.mirrored * (total / mirrored);
                 let ray = split.mirrored_ray(point);
-                self.meet_lamps(walk, &ray, |_| 1.0);
+                self.meet_lamps(walk, &ray, beyond);
                 walk.turns(ray, None, numbers)
             } else {
                 walk.throughput *= split.transmitted * (total / through);
@@ -261,7 +267,7 @@ impl<'a> Paths<'a> {
                 walk.eta_scale *= scale;
                 walk.media = split.behind.clone();
                 let ray = split.transmitted_ray(point);
-                self.meet_lamps(walk, &ray, |_| 1.0);
+                self.meet_lamps(walk, &ray, beyond);
                 walk.turns(ray, None, numbers)
             };
         }

@@ -193,6 +193,28 @@ fn a_lamp_with_a_size_shines_through_clear_glass() {
 }
 
 #[test]
+fn a_lamp_in_its_own_bulb_of_glass_is_counted_once() {
+    // Light passes a lamp's own bulb, which glows itself: it must not come through its glass besides.
+    let lit = |with_bulb: bool| {
+        let mut world = World::new();
+        let floor = Quadric::new(QuadricShape::Plane);
+        exact(&mut world, floor, Material::matt(Vec3::splat(0.5)), Transform::IDENTITY);
+        let at = DVec3::new(0.3, 2.0, 0.0);
+        if with_bulb {
+            let mut bulb = glass(1.0);
+            bulb.front.emission = Vec3::splat(1e-6);
+            exact(&mut world, Quadric::sphere(0.8), bulb, Transform::from_translation(at));
+        }
+        round_lamp(&mut world, 0.7, at, false);
+        camera(&mut world, DVec3::new(0.0, 0.1, 0.01), DVec3::ZERO, 1e-6);
+        mean_of_paths(&mut world, &paths(4, 4096))
+    };
+    let [(bare, _), (found, error)] = [false, true].map(lit);
+    println!("{found} ± {error} in its bulb for {bare}");
+    assert!((found - bare).abs() < 5.0 * error + 1e-3 * bare, "{found} ± {error} for {bare}");
+}
+
+#[test]
 fn a_lamp_with_a_size_lights_others_as_an_emissive_sphere_does() {
     // Directly, through a slab that bends light and reflects it, by a mirror, by a shiny floor and past a pane: every
     // way to find it, alone and together with the others.

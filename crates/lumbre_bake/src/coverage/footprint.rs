@@ -230,6 +230,29 @@ impl Texel {
         }
     }
 
+    /// Whether the footprint consists of points that stand for all that triangles cover of the texel: not where geometry
+    /// hides a part of it, as only the points are known to be in the open there.
+    pub fn has_points_for_all(&self) -> bool {
+        let is_coarse = |point: &FootprintPoint| {
+            let column_and_row = point.offset * COARSE as f32 - 0.5;
+            column_and_row == column_and_row.round()
+        };
+        matches!(&self.footprint, Footprint::Points(points) if points.iter().all(is_coarse))
+    }
+
+    /// The point of the footprint's triangles at a place in the texel's unit square; `None` where they do not cover it.
+    pub fn covered_point(&self, scene: &BakeScene, x: f32, y: f32) -> Option<FootprintPoint> {
+        let Footprint::Points(points) = &self.footprint else { return self.point(scene, x, y) };
+        let offset = Vec2::new(x, y);
+        let place = Vec2::new(self.x as f32, self.y as f32) + offset;
+        points.chunk_by(|a, b| a.triangle == b.triangle).find_map(|of_triangle| {
+            let triangle = of_triangle[0].triangle;
+            let at = barycentric(&scene.triangles[triangle as usize], place)
+                .filter(|&(u, v)| u >= 0.0 && v >= 0.0 && u + v <= 1.0)?;
+            Some(FootprintPoint { triangle, at, offset })
+        })
+    }
+
     /// The mean position of the footprint in the texel's unit square.
     pub fn middle(&self) -> Vec2 {
         match &self.footprint {

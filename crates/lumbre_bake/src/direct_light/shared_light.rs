@@ -167,7 +167,7 @@ impl<'a> SharedLight<'a> {
         goal: &impl Fn(f64) -> f64,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
-        let (mut before, mut chosen_share) = (f64::INFINITY, None);
+        let (mut before, mut chosen_share) = ([f64::INFINITY; 2], None);
         loop {
             let relative = local.relative_errors(&self.smoothed.errors());
             let is_sampled = |texel: &CoveredTexel| self.sums[texel.place()].samples > 0;
@@ -199,11 +199,13 @@ impl<'a> SharedLight<'a> {
                 chosen_share = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
             }
             let goal = goal(chosen_share.unwrap_or(least));
-            let over = errors.over(goal);
-            if over <= ENOUGH || over * goal > STALLED * before {
+            let sums = errors.sums();
+            let is_open =
+                |place: usize| sums[place] > goal * ENOUGH && sums[place] <= STALLED * before[place];
+            if !is_open(0) && !is_open(1) {
                 return Ok(());
             }
-            before = over * goal;
+            before = sums;
             let shares = errors.shares(goal, MAX_REDUCTION.recip());
             let goal = WeightedGoal::new(&relative.cautious, &shares, &sampled, ORDER);
             let allocated = allocator(&goal.variances).within(budget, goal.sum);

@@ -15,7 +15,7 @@ const OWN_SHARE: f64 = 1.0 / 3.0;
 const NEGLECTED_SHARE: f64 = 0.05;
 /// The block of hidden texels, which nobody sees.
 const UNSEEN: u32 = u32::MAX;
-/// At least so many blocks in view are kept of a block that has any; more than one per texel are not.
+/// Of a block, as many blocks in view are kept as it has texels, but at least so many.
 const MIN_KEPT: usize = 4;
 
 /// What is in view from each block of texels.
@@ -99,15 +99,25 @@ impl Views {
         seen.map(|(&number, _)| f64::from(number)).sum()
     }
 
+    /// The largest of the blocks' numbers that [`Views::worst`] counts, and all smaller ones, each with its number of
+    /// texels.
+    pub fn counted<'a>(&'a self, of_blocks: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
+        let worst = self.worst(of_blocks);
+        let counted = (0..of_blocks.len()).filter(move |&block| of_blocks[block] <= worst);
+        counted.map(|block| (block, f64::from(self.texels[block])))
+    }
+
     /// The number of texels that are seen; at least 1, as it is divided by.
     pub fn seen_texels(&self) -> f64 {
         self.texels.iter().map(|&texels| f64::from(texels)).sum::<f64>().max(1.0)
     }
 
     /// Per covered texel, the share in (0, 1] that may be left of its squared error if of that in the view from each
-    /// block `of_blocks` may be left, and of the whole level's at most `of_whole`. What the worst view needs is enough
-    /// for those that are neglected.
-    pub fn shares(&self, of_blocks: &[f64], of_whole: f64, squares: &[f32]) -> Vec<f32> {
+    /// block `of_blocks` may be left, and of the whole level's at most `of_whole`; but at least the `least` share. What
+    /// the worst view needs is enough for those that are neglected. What is in view of each other is taken to need the
+    /// same: a block's own view decides what it needs.
+    pub fn shares(&self, of_blocks: &[f64], of_whole: f64, least: f64, squares: &[f32]) -> Vec<f32> {
+        let least_share = least as f32;
         let needs: Vec<f64> = of_blocks.iter().map(|share| share.recip()).collect();
         let least = self.worst(&needs).max(1.0).recip();
         let share_of = |&block: &u32| match block {
@@ -118,7 +128,7 @@ impl Views {
         let left: Vec<f32> = squares.par_iter().zip(&shares).map(|(square, share)| square * share).collect();
         let scale = of_whole * self.sum(squares) / self.sum(&left).max(f64::MIN_POSITIVE);
         if scale < 1.0 {
-            shares.par_iter_mut().for_each(|share| *share *= scale as f32);
+            shares.par_iter_mut().for_each(|share| *share = (*share * scale as f32).max(least_share));
         }
         shares
     }
@@ -129,7 +139,7 @@ pub(crate) struct ErrorsInViews<'a> {
     views: &'a Views,
     squares: &'a [f32],
     /// The sum over the whole level.
-    pub sum: f64,
+    sum: f64,
     /// The mean in the view from each block.
     in_views: Vec<f64>,
 }
@@ -140,19 +150,18 @@ impl<'a> ErrorsInViews<'a> {
         Self { views, squares, sum: views.sum(squares), in_views: views.means(squares) }
     }
 
-    /// How many times as large as a goal the errors are: as that for the sum over the whole level, or in the worst view,
-    /// as its mean.
-    pub fn over(&self, goal: f64) -> f64 {
-        self.sum.max(self.views.worst(&self.in_views) * self.views.seen_texels()) / goal
+    /// The sum over the whole level, and what it would be if all of it were like the worst view.
+    pub fn sums(&self) -> [f64; 2] {
+        [self.sum, self.views.worst(&self.in_views) * self.views.seen_texels()]
     }
 
-    /// Per covered texel, the share in (0, 1] of its squared error that may be left so that they reach the goal; none is
-    /// smaller than `least`.
+    /// Per covered texel, the share in (0, 1] of its squared error that may be left so that they reach the goal, and at
+    /// least the `least` share.
     pub fn shares(&self, goal: f64, least: f64) -> Vec<f32> {
         let share = |square: f64, goal: f64| (goal / square.max(f64::MIN_POSITIVE)).clamp(least, 1.0);
         let per_texel = goal / self.views.seen_texels();
         let of_blocks: Vec<f64> = self.in_views.iter().map(|&square| share(square, per_texel)).collect();
-        self.views.shares(&of_blocks, share(self.sum, goal), self.squares)
+        self.views.shares(&of_blocks, share(self.sum, goal), least, self.squares)
     }
 }
 
@@ -190,7 +199,7 @@ mod tests {
         views.block_of = [vec![0; 60], vec![1; 33], vec![2; 4], vec![3; 3], vec![UNSEEN]].concat();
         let squares: Vec<f32> = [vec![1.0; 93], vec![100.0; 7], vec![f32::NAN]].concat();
         let errors = ErrorsInViews::new(&views, &squares);
-        assert_eq!((errors.sum, errors.over(200.0)), (793.0, 50.0));
+        assert_eq!(errors.sums(), [793.0, 10_000.0]);
         // A goal of 2 per texel: the large room is below it, the small one is to keep a fiftieth.
         let shares = errors.shares(200.0, 0.0);
         assert_eq!((shares[0], shares[99], shares[100]), (1.0, 0.02, 1.0));

@@ -155,6 +155,23 @@ impl ErrorLedger<'_> {
         sum_of(|bias| bias.rest) - sum_of(|bias| bias.expected).max(0.0)
     }
 
+    /// The mean over the view from each block of squared errors relative to local light, without the effect of chance on
+    /// the patches' error that is known to cancel there.
+    pub fn in_views(&self, relative: &[f32]) -> Vec<f64> {
+        let views = &self.direct.local.views;
+        let mut in_views = views.means(relative);
+        let Some(gather) = &self.gather else { return in_views };
+        let means_of = |square: fn(&PatchBias) -> f32| {
+            let squares: Vec<f32> = gather.patches.iter().map(square).collect();
+            views.means(&self.direct.local.relative(&squares))
+        };
+        let (rest, expected) = (means_of(|bias| bias.rest), means_of(|bias| bias.expected));
+        for ((mean, rest), expected) in in_views.iter_mut().zip(rest).zip(expected) {
+            *mean = (*mean - (rest - expected.max(0.0))).max(0.0);
+        }
+        in_views
+    }
+
     /// What the map's error is made of, the largest part first: the parts' squares add up to that of the whole.
     pub fn parts(&self) -> Vec<ErrorPart> {
         let (open, by_chance) = (self.open_texels(), self.by_chance());

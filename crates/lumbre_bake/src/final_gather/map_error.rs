@@ -28,11 +28,8 @@ impl MapError {
         let relative = ledger.direct.local.relative(&errors.expected);
         let sum = open_sum(&ledger.texels.list, &relative);
         let relative_squares = sum - ledger.by_chance();
-        // Chance, which cancels in the mean of many texels, does so in a view too.
-        let without_chance = if sum > 0.0 { (relative_squares / sum).max(0.0) } else { 1.0 };
+        let in_views = ledger.in_views(&relative);
         let views = &ledger.direct.local.views;
-        let in_views: Vec<f64> =
-            views.means(&relative).into_iter().map(|square| without_chance * square).collect();
         Self {
             relative_squares,
             relative: root(relative_squares / open),

@@ -56,9 +56,10 @@ impl<'a> ErrorLeft<'a> {
             return is_stuck(whole, reducible);
         }
         let (mut total, mut reducible) = (0.0, 0.0);
-        for (&in_view, &part) in self.in_views[0].iter().zip(&self.in_views[1]) {
-            if in_view > requested {
-                (total, reducible) = (total + in_view, reducible + part);
+        let [in_views, parts] = &self.in_views;
+        for (block, texels) in self.local.views.counted(in_views) {
+            if in_views[block] > requested {
+                (total, reducible) = (total + texels * in_views[block], reducible + texels * parts[block]);
             }
         }
         is_stuck(total, reducible)
@@ -74,7 +75,8 @@ impl<'a> ErrorLeft<'a> {
             .collect();
         let [whole, whole_reducible] = self.whole;
         let of_whole = share_left(whole, whole_reducible, aim * open.len() as f64);
-        let shares = self.local.views.shares(&of_blocks, of_whole, &self.reducible.expected);
+        let shares =
+            self.local.views.shares(&of_blocks, of_whole, MAX_REDUCTION.recip(), &self.reducible.expected);
         WeightedGoal::new(&self.reducible.cautious, &shares, open, CONVERGENCE_ORDER)
     }
 }

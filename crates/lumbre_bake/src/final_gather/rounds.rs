@@ -118,15 +118,18 @@ pub(crate) fn gather(
         curve.push(ErrorAtTime { seconds: result.seconds, error: result.error.relative });
         // A round needs time for its rays, and for another evaluation.
         let affordable = speed.affordable_samples(monitor.seconds() - begun, monitor.clock());
+        if is_reached {
+            break (result, Ended::Reached);
+        }
         let left = planner.left(&gathered, &result);
         let next = planner.plan(&gathered, &result.error, &left, decide(monitor, affordable)?);
         let is_late = !in_time || monitor.clock().is_over() || next.is_late;
         let is_hardly_reducible = left.is_hardly_reducible(options.error.powi(2), planner.count());
         let has_stalled = plan.as_ref().is_some_and(|plan| plan.has_stalled(&left));
         stalled_rounds = if has_stalled { stalled_rounds + 1 } else { 0 };
-        let ended = Ended::after(is_reached, is_late || monitor.is_late(), next.is_last);
+        let ended = Ended::after(false, is_late || monitor.is_late(), next.is_last);
         let rays_gain_nothing = is_hardly_reducible || stalled_rounds == MAX_STALLED_ROUNDS;
-        if is_reached || is_late || rays_gain_nothing || is_all_reused || next.is_last {
+        if is_late || rays_gain_nothing || is_all_reused || next.is_last {
             break (result, ended);
         }
         let variances = &result.reducible.expected;

@@ -21,7 +21,8 @@ impl Sources<'_> {
         let corners = corners.iter().filter_map(|&(x, y)| point(x, y));
         let reach = corners.map(|corner| corner.position.distance(anchor.position)).fold(0.0, f32::max);
         let cut = self.cut(&anchor, reach, &[]);
-        let receiver = SampledReceiver { point, visibility: &Visibility::UNKNOWN, sequence, samples };
+        let receiver =
+            SampledReceiver { point, covered: None, visibility: &Visibility::UNKNOWN, sequence, samples };
         let mut direct = self.irradiance_per_source(&cut, &receiver);
         self.add_shared_light(&cut.shared, sequence, SHARED_SAMPLES_FACTOR * samples, point, &mut direct);
         direct

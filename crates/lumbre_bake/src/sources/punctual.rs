@@ -33,6 +33,9 @@ const LARGEST_SINE: f64 = 0.99;
 /// part of the texel.
 const NEAR_SAMPLES: u32 = 64;
 
+/// Fewest shadow rays that are worth more than the points of a receiver, of which there are at most sixteen.
+const FEWEST_BEYOND_POINTS: u32 = 32;
+
 /// Half of the distance between two rows of a receiver's sample points, as a fraction of its side.
 const HALF_A_ROW: f32 = 0.125;
 
@@ -48,6 +51,8 @@ pub(crate) struct LightSample {
 /// Sums over the samples of one light at a receiver, by batch.
 #[derive(Default)]
 struct LightEstimate {
+    /// Sampled points of the receiver.
+    points: [u32; BATCHES],
     center: [f32; BATCHES],
     disc: [f32; BATCHES],
     /// The part of `disc` that is visible.
@@ -74,13 +79,15 @@ impl LightEstimate {
     /// Mean irradiance per unit of colour, and its variance. This is the light of the centre times the visible fraction
     /// of the disc, which is exact in full light and in full shadow; where the horizon cuts the disc, it is the mean of
     /// the visible samples. `known_center` replaces the sampled light of the centre.
-    fn mean(&self, samples: u32, known_center: Option<f32>) -> (f32, f32) {
-        let samples = samples.max(1) as f32;
-        let per_batch = BATCHES as f32 / samples;
+    fn mean(&self, known_center: Option<f32>) -> (f32, f32) {
+        let samples = self.points.iter().sum::<u32>().max(1) as f32;
+        let batch_means = |sums: &[f32; BATCHES]| {
+            std::array::from_fn(|batch| sums[batch] / self.points[batch].max(1) as f32)
+        };
         let total = |sums: &[f32; BATCHES]| sums.iter().sum::<f32>();
         let all = total(&self.disc);
         if self.crosses_horizon || all <= 0.0 {
-            return (total(&self.seen) / samples, variance_of_mean(self.seen.map(|sum| sum * per_batch)));
+            return (total(&self.seen) / samples, variance_of_mean(batch_means(&self.seen)));
         }
         let center = known_center.unwrap_or(total(&self.center) / samples);
         let fraction = total(&self.seen) / all;
@@ -90,7 +97,7 @@ impl LightEstimate {
         };
         let fractions = std::array::from_fn(batch_fraction);
         // Where the light varies over the receiver, the mean of the visible part is as uncertain as the samples' mean.
-        let center_variance = variance_of_mean(self.center.map(|sum| sum * per_batch));
+        let center_variance = variance_of_mean(batch_means(&self.center));
         let fraction_variance = share_variance(fractions, fraction, self.visible + self.hidden);
         (center * fraction, center * center * fraction_variance + fraction * fraction * center_variance)
     }
@@ -116,7 +123,7 @@ impl Sources<'_> {
             Some(known) if !placed.is_sized() => self.past_shadows(index, known, sampled, direct),
             known => {
                 let clear = matches!(known, Some(LightVisibility::Clear));
-                self.by_shadow_rays(index, clear, sampled, direct)
+                self.by_shadow_rays(index, (clear, &sampled.point), sampled, direct)
             }
         };
         let color = placed.light.diffuse;
@@ -141,11 +148,11 @@ impl Sources<'_> {
     }
 
     /// Mean irradiance by a light per unit of its colour, and its variance, estimated by samples. Casts no rays if the
-    /// light is known to be `clear`.
+    /// light is known to be `clear`. The rays start at the places that `point` gives for points of the unit square.
     fn by_shadow_rays(
         &self,
         index: u32,
-        clear: bool,
+        (clear, point): (bool, &dyn Fn(f32, f32) -> Option<Receiver>),
         sampled: &SampledReceiver<'_, impl SurfacePoints>,
         direct: &mut Direct,
     ) -> (f32, f32) {
@@ -159,22 +166,28 @@ impl Sources<'_> {
         for sample in 0..samples {
             let [a, b, c, d] = sequence.point(sample, 0);
             let (x, y, u, v) = if is_sized { (c, d, a, b) } else { (a, b, c, d) };
-            let Some(receiver) = (sampled.point)(x, y) else { continue };
+            let Some(receiver) = point(x, y) else { continue };
+            let batch = batch_of(sample, samples);
+            estimate.points[batch] += 1;
             if let Some(light_sample) = sample_light(self.scene, light, &receiver, (u, v), clear) {
-                estimate.add(&light_sample, batch_of(sample, samples));
+                estimate.add(&light_sample, batch);
             }
+        }
+        if estimate.points == [0; BATCHES] && sampled.covered.is_some() {
+            // What is covered is too little for so few points: those that stand for it do not miss it.
+            return self.by_shadow_rays(index, (clear, &sampled.point), sampled, direct);
         }
         direct.rays += if clear { 0 } else { estimate.visible + estimate.hidden };
         direct.sampled |= !clear || estimate.crosses_horizon;
         direct.seen.add(FIRST_ID + index, estimate.visible, estimate.hidden);
         // The light of a near light varies strongly over the receiver, so the known mean does not apply to its lit part
         // alone.
-        estimate.mean(samples, center.filter(|_| estimate.hidden == 0))
+        estimate.mean(center.filter(|_| estimate.hidden == 0))
     }
 
     /// The same for a light without size whose visibility is known. Shadows are exact on a receiver that is a
     /// parallelogram, and the light is approximated as constant within each of its lit pieces; on another receiver they
-    /// are known at some of its points, and more samples than these are shadow rays.
+    /// are known at some of its points, and many samples are shadow rays to all of it.
     fn past_shadows(
         &self,
         index: u32,
@@ -198,8 +211,9 @@ impl Sources<'_> {
         };
         let Some(middle) = point(0.5, 0.5) else { return (0.0, 0.0) };
         // Points that stand for the receiver are only the first estimate of where a shadow's edge crosses it.
-        if matches!(shape, ReceiverShape::Points(points) if points.len() < sampled.samples as usize) {
-            return self.by_shadow_rays(index, false, sampled, direct);
+        let covered = sampled.covered.filter(|_| matches!(shape, ReceiverShape::Points(_)));
+        if let Some(covered) = covered.filter(|_| sampled.samples >= FEWEST_BEYOND_POINTS) {
+            return self.by_shadow_rays(index, (false, covered), sampled, direct);
         }
         let (mut sum, mut lit, mut pieces) = (0.0, 0.0, PolygonClipper::new());
         let is_exact = origin.lit(shape, shadows, &mut pieces, |place: DVec3, share| {
@@ -207,7 +221,7 @@ impl Sources<'_> {
             lit += share;
         });
         let (hidden, lit) = (u32::from(lit < 1.0 - GAP), (lit as f32).min(1.0));
-        direct.sampled |= !is_exact && hidden > 0 && lit > 0.0;
+        direct.sampled |= covered.is_some() && hidden > 0 && lit > 0.0;
         direct.seen.add(FIRST_ID + index, u32::from(lit > 0.0), hidden);
         if lit == 0.0 {
             return (0.0, 0.0);

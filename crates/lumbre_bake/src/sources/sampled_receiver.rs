@@ -13,6 +13,9 @@ impl<F: Fn(f32, f32) -> Option<Receiver>> SurfacePoints for F {}
 /// A piece of surface that receives direct light as a whole, and how it is sampled.
 pub(crate) struct SampledReceiver<'a, P: SurfacePoints> {
     pub point: P,
+    /// Where `point` knows only a few points that stand for the receiver: maps the unit square onto all of it and what
+    /// is beside it, where it gives `None`.
+    pub covered: Option<&'a dyn Fn(f32, f32) -> Option<Receiver>>,
     /// What is known of the occluders between it and the sources.
     pub visibility: &'a Visibility<'a>,
     pub sequence: Sequence,

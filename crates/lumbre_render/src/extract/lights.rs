@@ -216,6 +216,22 @@ impl LightSet {
         self.unbounded.add_polygon(polygon);
     }
 
+    fn has_room_for(&self, views: usize) -> bool {
+        self.shadow_views + views <= MAX_VIEWS
+    }
+
+    /// The class that a light of some class has after those that are counted: the numbers of compact records and of
+    /// shadows are limited.
+    fn class_of(&self, light: &Light, class: LightClass) -> LightClass {
+        match class {
+            LightClass::Shadowed if !self.has_room_for(shadow_views(light)) => LightClass::Ranged,
+            LightClass::InverseSquare if self.inverse_square.all as usize == NUMBERED_LIGHTS => {
+                LightClass::Ranged
+            }
+            class => class,
+        }
+    }
+
     /// Counts a light and returns the class that it has in this frame; `None` for an ambient light. Baked
     /// lights must come last, so that the same lights go without a 16-bit index wherever lights are counted.
     fn add(&mut self, light: &Light, class: LightClass) -> Option<LightClass> {
@@ -225,16 +241,9 @@ impl LightSet {
             return None;
         }
         self.every.add(light);
-        let views = ShadowKind::of(light).filter(|_| light.shadow).map_or(0, ShadowKind::views);
-        let has_room = self.shadow_views + views <= MAX_VIEWS;
-        self.shadow_views += if has_room { views } else { 0 };
-        let class = match class {
-            LightClass::Shadowed if !has_room => LightClass::Ranged,
-            LightClass::InverseSquare if self.inverse_square.all as usize == NUMBERED_LIGHTS => {
-                LightClass::Ranged
-            }
-            class => class,
-        };
+        let class = self.class_of(light, class);
+        let views = shadow_views(light);
+        self.shadow_views += if self.has_room_for(views) { views } else { 0 };
         let counts = match class {
             LightClass::Unbounded => &mut self.unbounded,
             LightClass::InverseSquare => &mut self.inverse_square,
@@ -244,6 +253,11 @@ impl LightSet {
         counts.add(light);
         Some(class)
     }
+}
+
+/// The number of views that a light's shadow takes; 0 for a light without one.
+fn shadow_views(light: &Light) -> usize {
+    ShadowKind::of(light).filter(|_| light.shadow).map_or(0, ShadowKind::views)
 }
 
 /// What the shaders of an earlier frame support, while new ones are being created.
@@ -281,7 +295,7 @@ impl KnownLights<'_> {
                 own.shadows = ShadowCounts::default();
             }
             let baked = self.lightmaps && light.bake == BakeMode::Static;
-            let class = record.reach.class.in_frames(self.shadows);
+            let class = so_far.class_of(light, record.reach.class.in_frames(self.shadows));
             let of_class = match class {
                 LightClass::Unbounded => &self.set.unbounded,
                 LightClass::InverseSquare => &self.set.inverse_square,

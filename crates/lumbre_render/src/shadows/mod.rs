@@ -40,7 +40,7 @@ struct ViewData {
     parameters: [f32; 4],
 }
 
-/// `ShadowedLight` of shaders/shadows.wesl: a light with a compact record, and the views of its shadow.
+/// A record of `shadowed_lights` in shaders/shadows.wesl: a light with a compact record, and the views of its shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 struct ShadowedLightData {
@@ -52,6 +52,9 @@ struct ShadowedLightData {
     tile: [f32; 4],
     parameters: [f32; 4],
 }
+
+// `shadowed_lights` in shaders/shadows.wesl has room for this many texels.
+const _: () = assert!(size_of::<ShadowedLightData>() == 8 * 16 && (MAX_VIEWS + 1) * 8 == 1032);
 
 impl ShadowedLightData {
     /// Creates the record of a light with these views.
@@ -329,8 +332,10 @@ impl ShadowMaps {
         let pipelines = self.casters.as_ref().and_then(|casters| casters.get()?.ok());
         device.caster_group =
             pipelines.map(|pipelines| pipelines.group(&gpu.device, objects, &device.matrices));
-        device.planes_group =
-            pipelines.map(|pipelines| pipelines.planes_group(&gpu.device, &device.atlas_view));
+        if device.planes_group.is_none() {
+            device.planes_group =
+                pipelines.map(|pipelines| pipelines.planes_group(&gpu.device, &device.atlas_view));
+        }
         for caster in self.stale.iter().flat_map(|map| &map.casters) {
             if let Some(mesh) = meshes.get_mut(caster.mesh) {
                 uploads.meshes += mesh.prepare(gpu, &[Attribute::Position], None);
