@@ -67,16 +67,26 @@ impl<'a> ErrorLeft<'a> {
 
     /// The goal of a round that aims at a squared error of `aim` per texel, for the `open` texels of the level.
     pub fn goal(&self, aim: f64, open: &[CoveredTexel]) -> WeightedGoal {
+        self.goal_with(&self.shares_of_views(aim), aim, open)
+    }
+
+    /// The same for the whole level alone.
+    pub fn goal_of_whole(&self, aim: f64, open: &[CoveredTexel]) -> WeightedGoal {
+        self.goal_with(&vec![1.0; self.in_views[0].len()], aim, open)
+    }
+
+    /// Per block, the share of the reducible squared error that may be left in the view from there.
+    fn shares_of_views(&self, aim: f64) -> Vec<f64> {
         let [total, reducible] = &self.in_views;
-        let of_blocks: Vec<f64> = total
-            .iter()
-            .zip(reducible)
-            .map(|(&total, &reducible)| share_left(total, reducible, aim))
-            .collect();
+        total.iter().zip(reducible).map(|(&total, &reducible)| share_left(total, reducible, aim)).collect()
+    }
+
+    /// The goal for these shares of the views and the aim for the whole level.
+    fn goal_with(&self, of_blocks: &[f64], aim: f64, open: &[CoveredTexel]) -> WeightedGoal {
         let [whole, whole_reducible] = self.whole;
         let of_whole = share_left(whole, whole_reducible, aim * open.len() as f64);
         let shares =
-            self.local.views.shares(&of_blocks, of_whole, MAX_REDUCTION.recip(), &self.reducible.expected);
+            self.local.views.shares(of_blocks, of_whole, MAX_REDUCTION.recip(), &self.reducible.expected);
         WeightedGoal::new(&self.reducible.cautious, &shares, open, CONVERGENCE_ORDER)
     }
 }

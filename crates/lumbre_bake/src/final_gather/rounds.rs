@@ -331,7 +331,9 @@ impl<'a> RoundPlanner<'a> {
         let budget = limit.saturating_sub(cast);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let requested = self.options.error.powi(2);
-        let requested_over_left = requested / error.worst().powi(2).max(f64::MIN_POSITIVE);
+        let is_whole_reached = error.relative <= self.options.error;
+        let missed = if is_whole_reached { error.in_worst_view } else { error.relative };
+        let requested_over_left = requested / missed.powi(2).max(f64::MIN_POSITIVE);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP;
         let (target, budget) = match is_small_step {
             true => {
@@ -350,7 +352,11 @@ impl<'a> RoundPlanner<'a> {
         let worthwhile = (WORTHWHILE * cast as f64) as u64;
         let mut target = target;
         let (goal, (mut added, mut wanted)) = loop {
-            let goal = left.goal(target * requested, &self.open);
+            // The mean over the level comes first: the rays may not suffice for every room.
+            let goal = match is_whole_reached {
+                true => left.goal(target * requested, &self.open),
+                false => left.goal_of_whole(target * requested, &self.open),
+            };
             let allocated = allocate(&goal, budget);
             if allocated.0 >= worthwhile || budget < worthwhile || target < LEAST_TARGET {
                 break (goal, allocated);
