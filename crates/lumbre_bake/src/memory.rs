@@ -26,8 +26,7 @@ const TRIANGLE_BYTES: u64 =
 /// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
 /// round, raw and smoothed estimates with their guides, its nearness, nineteen lists of one number each for the
 /// errors and what a round aims at, its chart, the light around it, and its block with its share of what is in view
-/// from there. (The sums of the shared samples of direct light need less, and are
-/// freed by then.)
+/// from there. (The sums of the shared samples of direct light need less, and are freed by then.)
 const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + size_of::<Direct>()
     + 2 * size_of::<GatherSums>()

@@ -55,6 +55,7 @@ mod frame_graph;
 mod frame_plan;
 mod frame_report;
 mod frame_scene;
+mod full_screen;
 mod g_buffer;
 mod gpu;
 mod growable_buffer;

@@ -2,6 +2,7 @@
 //! shaders/shared_records.wesl does. That needs lanes which all run, also those whose fragment is not covered
 //! or has been discarded. No specification promises this, so a small triangle is drawn once to find out.
 
+use crate::full_screen;
 use crate::growable_buffer::GrowableBuffer;
 use crate::table_texture::TableTexture;
 use crate::{Gpu, Offscreen, OffscreenFormat, RenderError, shader};
@@ -57,27 +58,8 @@ fn probe(gpu: &Gpu) -> Result<Vec<u8>, RenderError> {
     let mut table = TableTexture::new();
     table.make_room(gpu, LABEL, (numbers.len(), entry_size))?;
     table.write(gpu, bytemuck::cast_slice(&numbers), entry_size, 0..numbers.len());
-    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(LABEL),
-        layout: None,
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: Default::default(),
-        depth_stencil: None,
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(OffscreenFormat::Rgba8.texture_format().into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    });
+    let pipeline =
+        full_screen::pipeline(device, LABEL, &module, None, OffscreenFormat::Rgba8.texture_format());
     // In a uniform buffer, an entry of an array takes sixteen bytes.
     let entries = numbers.map(|number| [number, 0, 0, 0]);
     let mut buffer = GrowableBuffer::uniform(LABEL, entries.len());

@@ -14,6 +14,7 @@ use super::{Board, Effect, EffectWork, FrameGraph, Stage};
 use crate::error::EffectError;
 use crate::facts::SceneFacts;
 use crate::frame_plan::FrameShape;
+use crate::full_screen;
 use crate::pending::Pending;
 use crate::shader::{self, DisplayVariant};
 use crate::target::Viewport;
@@ -245,27 +246,7 @@ fn make(
         bind_group_layouts: &[Some(layout)],
         immediate_size: 0,
     });
-    Ok(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("display"),
-        layout: Some(&pipeline_layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: Default::default(),
-        depth_stencil: None,
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(format.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    }))
+    Ok(full_screen::pipeline(device, "display", &module, Some(&pipeline_layout), format))
 }
 
 /// Converts a colour to the values that the shaders write for a target of this format, in f64. Twin:

@@ -9,6 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DMat4, DVec3, DVec4, Mat4};
 
 use crate::extract::{CameraView, Object, Objects};
+use crate::full_screen;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::InverseSquareLightData;
 use crate::mesh_buffers::{Attribute, MeshBuffers, MeshKey};
@@ -571,27 +572,7 @@ fn planes_pipeline(
         bind_group_layouts: &[Some(layout)],
         immediate_size: 0,
     });
-    Ok(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(NAME),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: Default::default(),
-        depth_stencil: None,
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(PLANES_FORMAT.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    }))
+    Ok(full_screen::pipeline(device, NAME, &module, Some(&layout), PLANES_FORMAT))
 }
 
 impl OnDevice {

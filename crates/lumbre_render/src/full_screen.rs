@@ -1,0 +1,34 @@
+//! Pipelines that draw a triangle over the whole target, with the entry points `vertex` and `fragment` of a module.
+//! Not what they draw: display, planes of shadow maps and probes each have a shader of their own.
+
+/// Creates a pipeline without vertex buffers, depth or blending, for a target of one sample. Without a `layout`, the
+/// shader's bindings give it.
+pub(crate) fn pipeline(
+    device: &wgpu::Device,
+    label: &str,
+    module: &wgpu::ShaderModule,
+    layout: Option<&wgpu::PipelineLayout>,
+    format: wgpu::TextureFormat,
+) -> wgpu::RenderPipeline {
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout,
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: Default::default(),
+        depth_stencil: None,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &[Some(format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
