@@ -371,8 +371,8 @@ pub struct Trace {
     /// Rays of the ray tree with a smaller weight in the pixel are not traced.
     #[arg(long, value_name = "X", default_value_t = DEFAULT_WEIGHT, value_parser = weight, allow_negative_numbers = true)]
     pub weight: f64,
-    /// Samples per pixel. The ray tree takes exactly this many (1 without this), paths at most this many (64,
-    /// or as many as --error or --time need).
+    /// Samples per pixel. The ray tree takes exactly this many (1 without this), paths at most this many, rounded
+    /// up to a multiple of 4 (64, or as many as --error or --time need).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576), allow_negative_numbers = true)]
     pub samples: Option<u32>,
     /// Relative standard error of the whole picture at which paths end, like 0.01 or 1%.

@@ -50,7 +50,12 @@ pub fn bake_arguments(options: &BakeOptions) -> String {
         Density::Automatic => String::new(),
     };
     let patches = options.patch_texels.map_or_else(String::new, |texels| format!(" --patch-texels {texels}"));
-    format!("--error {}{density}{patches} --probes never --no-resolution-error --no-reuse", options.error)
+    let probes = match options.probes {
+        Probes::Never => " --probes never",
+        Probes::Always => " --probes always",
+        _ => "",
+    };
+    format!("--error {}{density}{patches}{probes} --no-resolution-error --no-reuse", options.error)
 }
 
 /// Returns a sentence that says why a scene cannot be baked, or `None` if it can.

@@ -108,7 +108,7 @@ fn names_of(points: &[&Point]) -> String {
 /// Returns the point of a series with the smallest error.
 fn smallest<'a>(points: &[&'a Point], series: &str) -> Option<&'a Point> {
     let own = points.iter().filter(|point| point.series == series && point.milliseconds.is_some());
-    let known = own.filter_map(|point| Some((*point, point.error?.relative_rmse)));
+    let known = own.filter_map(|point| Some((*point, point.error?.reached())));
     known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(point, _)| point)
 }
 
@@ -125,7 +125,7 @@ pub fn error_of(error: &ErrorOf) -> String {
     let ErrorOf { relative_rmse, uncertainty, .. } = *error;
     match uncertainty {
         0.0 => percent(relative_rmse),
-        open if open >= relative_rmse => format!("at most {}", percent(relative_rmse + open)),
+        _ if error.is_below_uncertainty() => format!("at most {}", percent(error.reached())),
         open => format!("{} ± {}", percent(relative_rmse), percent(open)),
     }
 }

@@ -5,9 +5,9 @@
 use crate::{ErrorOf, Point, Spread};
 
 /// Returns the points that no other point beats in both time and error, from the largest error to the
-/// smallest; the first of equal ones. Medians and errors are compared, without their uncertainty.
+/// smallest; the first of equal ones. Medians and errors that can be relied on are compared.
 pub fn pareto_front<'a>(points: impl IntoIterator<Item = &'a Point>) -> Vec<&'a Point> {
-    front_of(points, |point| Some((point.milliseconds?.median, point.error?.relative_rmse)))
+    front_of(points, |point| Some((point.milliseconds?.median, point.error?.reached())))
 }
 
 /// Returns the points that no other point beats in two numbers of which less is better, ordered by the first
@@ -66,14 +66,14 @@ pub struct Stretch<'a> {
 /// Returns the cheapest choices for every error, from the smallest error that any point reaches to the
 /// largest.
 ///
-/// A series reaches an error by its cheapest point whose error is at most that. A point that may reach the
-/// error, given the uncertainty of the reference, is included too unless its time rules it out. Adjacent
+/// A series reaches an error by its cheapest point whose error that can be relied on is at most that. A point that
+/// may reach the error, given the uncertainty of the reference, is included too unless its time rules it out. Adjacent
 /// ranges have different winners.
 pub fn stretches<'a>(points: &[&'a Point]) -> Vec<Stretch<'a>> {
     let mut known: Vec<(&Point, ErrorOf, Spread)> =
         points.iter().filter_map(|point| Some((*point, point.error?, point.milliseconds?))).collect();
-    known.sort_by(|a, b| a.1.relative_rmse.total_cmp(&b.1.relative_rmse));
-    let error = |at: usize| known.get(at).map_or(f64::INFINITY, |(_, error, _)| error.relative_rmse);
+    known.sort_by(|a, b| a.1.reached().total_cmp(&b.1.reached()));
+    let error = |at: usize| known.get(at).map_or(f64::INFINITY, |(_, error, _)| error.reached());
     let mut found: Vec<Stretch<'a>> = Vec::new();
     for at in 0..known.len() {
         let (from, to) = (error(at), error(at + 1));
@@ -122,6 +122,25 @@ pub fn stretches<'a>(points: &[&'a Point]) -> Vec<Stretch<'a>> {
 mod tests {
     use super::*;
     use crate::PointPicture;
+
+    #[test]
+    fn an_uncertain_reference_proves_no_small_error() {
+        let point = |series: &str, ms: f64, relative_rmse: f64, uncertainty: f64| Point {
+            series: series.into(),
+            milliseconds: Spread::of(&[ms; 5]),
+            error: Some(ErrorOf { relative_rmse, uncertainty, ..ErrorOf::default() }),
+            ..Point::default()
+        };
+        // The reference's noise explains all of the first difference, and hardly any of the second.
+        let points = [point("unknown", 1.0, 0.0, 0.27), point("known", 2.0, 0.05, 0.01)];
+        let found = stretches(&points.iter().collect::<Vec<_>>());
+        let ranges: Vec<(f64, &str)> =
+            found.iter().map(|stretch| (stretch.from, stretch.cheapest[0].series.as_str())).collect();
+        assert_eq!(ranges, [(0.05, "known"), (0.27, "unknown")]);
+        assert!(found[0].by_error && found[0].cheapest.len() == 2, "{found:?}");
+        let front: Vec<&str> = pareto_front(&points).iter().map(|point| point.series.as_str()).collect();
+        assert_eq!(front, ["unknown", "known"]);
+    }
 
     #[test]
     fn points_with_different_references_do_not_beat_each_other() {

@@ -118,6 +118,22 @@ pub struct ErrorOf {
     pub uncertainty: f64,
 }
 
+impl ErrorOf {
+    /// Returns whether the reference is too uncertain to tell this error from none.
+    pub fn is_below_uncertainty(&self) -> bool {
+        self.uncertainty > 0.0 && self.uncertainty >= self.relative_rmse
+    }
+
+    /// Returns the error that can be relied on: the relative RMSE, or the most that it may be where the reference is
+    /// too uncertain to tell it from none.
+    pub fn reached(&self) -> f64 {
+        match self.is_below_uncertainty() {
+            true => self.relative_rmse + self.uncertainty,
+            false => self.relative_rmse,
+        }
+    }
+}
+
 /// The files of a point's picture, relative to the report's folder. `.exr` holds radiance, `.png` the picture
 /// as displayed, and `.heat.png` a map of the differences from the reference.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

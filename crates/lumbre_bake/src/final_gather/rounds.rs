@@ -39,6 +39,9 @@ const SMALL_STEP_TARGET: f64 = 0.9;
 /// The quality's rays count as spent if those left are less than this fraction of those cast: so few are not worth
 /// another smoothing.
 const MIN_ROUND: f64 = 0.15;
+/// Once the mean over the level reaches the requested error, the total number of rays may rise to this multiple of the
+/// quality's limit for the sake of views that do not: a level's brightest place hides what its rooms still need.
+const RAYS_FOR_VIEWS: f64 = 1.5;
 /// A round that adds a smaller fraction of the rays cast is not worth another smoothing either: while a round needs
 /// fewer, it aims at [`LOWER_TARGET`] of the squared error, down to [`LEAST_TARGET`] of what was requested.
 const WORTHWHILE: f64 = 0.02;
@@ -327,17 +330,21 @@ impl<'a> RoundPlanner<'a> {
         let [_, max_samples] = self.options.effort().gather.map(|samples| samples / REPLICATES as u32);
         let samples: Vec<u32> = gathered.iter().map(|sums| sums.samples).collect();
         let cast = all_samples(gathered);
-        let limit = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
-        let budget = limit.saturating_sub(cast);
-        let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let requested = self.options.error.powi(2);
         let is_whole_reached = error.relative <= self.options.error;
+        let of_quality = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
+        let limit = match is_whole_reached {
+            true => (of_quality as f64 * RAYS_FOR_VIEWS) as u64,
+            false => of_quality,
+        };
+        let budget = limit.saturating_sub(cast);
+        let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let missed = if is_whole_reached { error.in_worst_view } else { error.relative };
         let requested_over_left = requested / missed.powi(2).max(f64::MIN_POSITIVE);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP;
         let (target, budget) = match is_small_step {
             true => {
-                let raised_limit = (limit as f64 * SMALL_STEP_RAYS) as u64;
+                let raised_limit = limit.max((of_quality as f64 * SMALL_STEP_RAYS) as u64);
                 (SMALL_STEP_TARGET * requested_over_left, raised_limit.saturating_sub(cast))
             }
             false => (TARGET, budget),

@@ -183,6 +183,10 @@ fn of_scenes_that_no_constant_was_chosen_on() {
         ("rooms_57", 6.0, PATHS_IN_ROOMS),
         ("hall_41", 4.0, PATHS_IN_HALLS),
         ("hall_57", 4.0, PATHS_IN_HALLS),
+        ("cellar_41", 6.0, PATHS_IN_ROOMS),
+        ("sunlit_room_41", 6.0, PATHS_IN_ROOMS),
+        ("corridor_41", 6.0, PATHS_IN_ROOMS),
+        ("grille_41", 6.0, PATHS_IN_ROOMS),
     ];
     let mut sums = [0.0; 3];
     for (name, density, paths) in scenes {

@@ -15,7 +15,7 @@ use crate::baked::{
     texel_error,
 };
 use crate::converged_bake::{converged, converged_bake};
-use crate::findings::{cheapest_by_error, counted, error_of, percent, rounded, short, times_of};
+use crate::findings::{cheapest_by_error, counted, error_of, listed, percent, rounded, short, times_of};
 use crate::frames::draw_picture;
 use crate::measured::Measured;
 use crate::rounds::{Repeated, repeated};
@@ -39,6 +39,8 @@ const WITHOUT_BOUNCES: &str = "without bounces";
 const PATCH: &str = "texels along a patch";
 const ASKED: &str = "error asked for, %";
 const STATED: &str = "error stated, % of the mean";
+/// The statement that a request is about: the larger one of the whole level's error and that in its worst view.
+const STATED_IN_VIEW: &str = "error stated in the worst view, %";
 const FOUND: &str = "error found, % of the mean";
 
 /// Runs the study.
@@ -178,7 +180,12 @@ fn of_scene(
         let error = texel_error(&maps, &truth.maps);
         let picture = draw_picture(conditions, &mut baked.world, &FrameOptions::default())?;
         let report = &baked.report;
-        let mut figures: Vec<(&str, f64)> = vec![(STATED, 100.0 * report.error_of_mean)];
+        let mut figures: Vec<(&str, f64)> = Vec::new();
+        if asked.bounces {
+            // A bake without bounces states the error of direct light, which is not the error found here.
+            figures.push((STATED, 100.0 * report.error_of_mean));
+            figures.push((STATED_IN_VIEW, 100.0 * report.estimated_error.max(report.error_in_worst_view)));
+        }
         figures.extend(error.map(|error| (FOUND, 100.0 * error.relative_rmse)));
         let counts = [
             ("rays", report.rays as f64),
@@ -250,22 +257,8 @@ fn command(conditions: &Conditions<'_>, scene: &SceneFile, asked: &Asked) -> Str
 
 fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
     let mut findings = Vec::new();
-    // A bake without bounces states the error of direct light.
-    let whole = points.iter().filter(|point| !point.series.starts_with(WITHOUT_BOUNCES));
-    let ratios: Vec<f64> = whole
-        .filter_map(|point| {
-            Some(point.figures.get(FOUND)? / point.figures.get(STATED).filter(|stated| **stated > 0.0)?)
-        })
-        .collect();
-    if let Some(ratio) = Spread::of(&ratios) {
-        let most = ratios.iter().copied().fold(0.0, f64::max);
-        findings.push(format!(
-            "The true error of a bake of the {} is {} times the stated one in the median, and {} times at most.",
-            scene.name,
-            rounded(ratio.median),
-            rounded(most)
-        ));
-    }
+    findings.push(of_statements(scene, points));
+    findings.extend(of_missed_requests(points));
     findings.extend(cheapest_by_error(points, ""));
     let finals: Vec<&&Point> = points.iter().filter(|point| point.series.starts_with("final")).collect();
     if let (Some(coarse), Some(fine)) = (finals.first(), finals.last())
@@ -285,6 +278,47 @@ fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
     findings.extend(of_patches(points));
     findings.extend(of_bounces(points));
     findings
+}
+
+/// Compares the errors that bakes state with those found, where the converged bake is exact enough to find them.
+fn of_statements(scene: &SceneFile, points: &[&Point]) -> String {
+    let found = |point: &&&Point| point.error.is_some_and(|error| !error.is_below_uncertainty());
+    let ratios: Vec<f64> = points
+        .iter()
+        .filter(found)
+        .filter_map(|point| {
+            Some(point.figures.get(FOUND)? / point.figures.get(STATED).filter(|stated| **stated > 0.0)?)
+        })
+        .collect();
+    let most = ratios.iter().copied().fold(0.0, f64::max);
+    match Spread::of(&ratios) {
+        Some(ratio) => format!(
+            "The true error of a bake of the {} is {} times the stated one in the median, and {} times at most.",
+            scene.name,
+            rounded(ratio.median),
+            rounded(most)
+        ),
+        None => format!(
+            "The true errors of bakes of the {} are not known: the reference's own noise is as large as any difference from it.",
+            scene.name
+        ),
+    }
+}
+
+/// Names the bakes that ended with a larger error than was requested.
+fn of_missed_requests(points: &[&Point]) -> Option<String> {
+    let finals = points.iter().filter(|point| point.series.starts_with("final"));
+    let missed: Vec<String> = finals
+        .filter_map(|point| {
+            let (stated, requested) = (point.figures.get(STATED_IN_VIEW)?, point.parameters.get(ASKED)?);
+            (stated > requested)
+                .then(|| format!("{} ({} in the worst view)", point.label, percent(stated / 100.0)))
+        })
+        .collect();
+    let missed: Vec<&str> = missed.iter().map(String::as_str).collect();
+    (!missed.is_empty()).then(|| {
+        format!("Requested and not reached, as every bake says of itself: {}.", listed(&missed, "and"))
+    })
 }
 
 /// Compares the bake without bounces with that of all of them for the same error.

@@ -45,6 +45,7 @@ const TEXELS: f64 = 2_500.0;
 const PAIRS: &str = "form factors of all pairs";
 const BAKES: &str = "bakes by size of patches";
 const BAKE: &str = "radiosity";
+const ITERATIONS: &str = "solver iterations";
 const PICTURE: &str = "ray tracing";
 /// Seconds for the frames of a full report.
 const SECONDS: f64 = 12.0;
@@ -291,6 +292,7 @@ fn of_radiosity(
             ("texels", report.texels as f64),
             ("patches", report.patches as f64),
             ("form factors", report.form_factors as f64),
+            (ITERATIONS, f64::from(report.iterations.into_iter().max().unwrap_or_default())),
         ];
         Ok((1e3 * report.seconds, counts))
     })?;
@@ -309,8 +311,9 @@ fn of_radiosity(
             ..Point::default()
         });
     }
-    let finding = finding_of_radiosity(&measured.study.points);
-    measured.study.findings.extend(finding);
+    let points = &measured.study.points;
+    let findings = [finding_of_radiosity(points), finding_of_solver(points)];
+    measured.study.findings.extend(findings.into_iter().flatten());
     Ok(())
 }
 
@@ -323,6 +326,22 @@ fn finding_of_radiosity(points: &[Point]) -> Option<String> {
         milliseconds(&bake),
         milliseconds(&picture),
         times_of(&bake, &picture)
+    ))
+}
+
+/// Says how soon the radiosity system converges, for the fewest and the most patches.
+fn finding_of_solver(points: &[Point]) -> Option<String> {
+    let count = |point: &Point, name: &str| point.counts.get(name).copied();
+    let known = points.iter().filter_map(|point| Some((count(point, "patches")?, count(point, ITERATIONS)?)));
+    let known: Vec<(f64, f64)> = known.collect();
+    let few = known.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let many = known.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "The radiosity system of {} patches is solved after {} iterations, that of {} patches after {}.",
+        counted(few.0),
+        counted(few.1),
+        counted(many.0),
+        counted(many.1)
     ))
 }
 

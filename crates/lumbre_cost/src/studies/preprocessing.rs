@@ -295,8 +295,12 @@ fn findings_of_frames(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Ve
     {
         let [before, after] =
             [alone, lit].map(|frame| rounded(f64::from(frame.statistics.lights_per_object)));
+        let lights = match before == after {
+            true => format!("as many lights in its list as without them, {after}"),
+            false => format!("{after} lights in its list instead of {before}"),
+        };
         findings.push(format!(
-            "With lightmaps a frame takes {} times as long as without them, and an object in view has {after} lights in its list instead of {before}, on average. Baking the lightmaps takes {} s once, as long as {} such frames ({}).",
+            "With lightmaps a frame takes {} times as long as without them, and an object in view has {lights}, on average. Baking the lightmaps takes {} s once, as long as {} such frames ({}).",
             factor(&ratio),
             rounded(1e-3 * bake),
             rounded(bake / time.median.max(1e-9)),

@@ -17,13 +17,13 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Stu
 const EXPONENTS: &[f32] = &[4.0, 16.0, 64.0, 256.0];
 const FEW_EXPONENTS: &[f32] = &[8.0, 64.0];
 const EXPONENT: &str = "exponent";
-/// Returns what is measured: each model with the documents' bare lobe, and Blinn's with an energy-conserving
-/// one.
+/// Returns what is measured: each model with the documents' bare lobe, and Phong's and Blinn's with an
+/// energy-conserving one.
 fn variants() -> Vec<Variant> {
     let bare = |&model| Variant { model, lobe: Lobe::Bare };
-    let conserving = Variant { model: ReflectionModel::Blinn, lobe: Lobe::EnergyConserving };
-    // Phong's is the first: all others are compared with it.
-    ReflectionModel::ALL.iter().map(bare).chain([conserving]).collect()
+    let conserving = [ReflectionModel::Phong, ReflectionModel::Blinn]
+        .map(|model| Variant { model, lobe: Lobe::EnergyConserving });
+    ReflectionModel::ALL.iter().map(bare).chain(conserving).collect()
 }
 
 /// A reflection model, and how its specular coefficient is interpreted.
@@ -31,6 +31,13 @@ fn variants() -> Vec<Variant> {
 struct Variant {
     model: ReflectionModel,
     lobe: Lobe,
+}
+
+impl Variant {
+    /// Returns what it is compared with: Phong's model with the same lobe.
+    fn reference(self) -> Self {
+        Self { model: ReflectionModel::Phong, ..self }
+    }
 }
 
 /// Angles between light and normal in degrees for which the lobes themselves are compared.
@@ -128,11 +135,16 @@ fn of_subjects(
     }
     let drawn = draw_frames(conditions, frames, SECONDS * (told[1] - told[0]), told)?;
     for ((scenes, subject), drawn) in scenes.iter().zip(subjects).zip(drawn.chunks(variants.len())) {
-        let reference =
-            measured.keep_reference(&format!("Phong {}", subject.label), drawn[0].picture.clone());
-        for ((&variant, scene), frame) in variants.iter().zip(scenes).zip(drawn) {
-            let point = point(conditions, scene, variant, subject, frame);
-            measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+        for lobe in [Lobe::Bare, Lobe::EnergyConserving] {
+            let of_lobe = || variants.iter().zip(scenes).zip(drawn).filter(|((v, _), _)| v.lobe == lobe);
+            let phong = of_lobe().find(|((variant, _), _)| **variant == variant.reference());
+            let Some(((phong, _), frame)) = phong else { continue };
+            let name = format!("{} {}", name_of(*phong), subject.label);
+            let reference = measured.keep_reference(&name, frame.picture.clone());
+            for ((&variant, scene), frame) in of_lobe() {
+                let point = point(conditions, scene, variant, subject, frame);
+                measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+            }
         }
     }
     Ok(drawn)
@@ -143,7 +155,7 @@ fn study() -> Study {
         name: "reflection".into(),
         title: "Reflection models compared with Phong's".into(),
         question: "Blinn's half vector with Phong's exponent, with four times that exponent, with a matched exponent or with an energy-conserving lobe, and the microfacets of Torrance and Sparrow: how much do their highlights differ from Phong's, and do they cost more, as document [M] says of Blinn's model with Fresnel's term and geometric attenuation, which is that of Torrance and Sparrow here?".into(),
-        reference: "the same ball or sheet under Phong's model with the same exponent and the same light".into(),
+        reference: "the same ball or sheet under Phong's model with the same exponent, lobe and light".into(),
         plots: vec![
             Plot {
                 title: "Difference from Phong's highlight".into(),
@@ -181,8 +193,9 @@ fn study() -> Study {
 
 fn name_of(variant: Variant) -> &'static str {
     match variant.model {
-        _ if variant.lobe == Lobe::EnergyConserving => "Blinn, energy-keeping",
+        ReflectionModel::Phong if variant.lobe == Lobe::EnergyConserving => "Phong, energy-keeping",
         ReflectionModel::Phong => "Phong",
+        _ if variant.lobe == Lobe::EnergyConserving => "Blinn, energy-keeping",
         ReflectionModel::Blinn => "Blinn, n",
         ReflectionModel::Blinn4n => "Blinn, 4n",
         ReflectionModel::BlinnMatched => "Blinn, fitted",
@@ -217,13 +230,12 @@ fn point(
     }
 }
 
-/// Returns the root mean square difference of a model's highlight from Phong's, divided by that of Phong's,
-/// over the viewing directions above a surface, in f64.
+/// Returns the root mean square difference of a model's highlight from Phong's with the same lobe, divided by
+/// that of Phong's, over the viewing directions above a surface, in f64.
 fn lobes_apart(variant: Variant, shininess: f32, incidence: f64) -> f64 {
     const STEPS: u32 = 90;
     let surface = Surface { specular: Vec3::ONE, shininess, ..Surface::default() };
-    let bare = SurfaceSample::from(&surface);
-    let own = SurfaceSample { lobe: variant.lobe, ..bare };
+    let surface = SurfaceSample { lobe: variant.lobe, ..SurfaceSample::from(&surface) };
     let light = DVec3::new(incidence.sin(), incidence.cos(), 0.0);
     let (mut squares, mut of_phong) = (0.0, 0.0);
     for row in 0..STEPS {
@@ -232,10 +244,10 @@ fn lobes_apart(variant: Variant, shininess: f32, incidence: f64) -> f64 {
             let around = (f64::from(column) + 0.5) / f64::from(STEPS) * std::f64::consts::PI;
             let (sine, cosine) = elevation.sin_cos();
             let viewer = DVec3::new(sine * around.cos(), cosine, sine * around.sin());
-            let highlight = |model, surface| specular_reflection(model, surface, DVec3::Y, light, viewer).x;
-            let phong = highlight(ReflectionModel::Phong, &bare);
+            let highlight = |model| specular_reflection(model, &surface, DVec3::Y, light, viewer).x;
+            let phong = highlight(ReflectionModel::Phong);
             // The sine is proportional to the solid angle of a step of elevation.
-            squares += sine * (highlight(variant.model, &own) - phong).powi(2);
+            squares += sine * (highlight(variant.model) - phong).powi(2);
             of_phong += sine * phong.powi(2);
         }
     }
@@ -254,7 +266,8 @@ fn errors_over<'a>(
 
 /// Reports how far each model's highlight on a sheet is from Phong's, from the steepest light to the lowest.
 fn of_incidences(study: &Study) -> Option<String> {
-    let told = variants().into_iter().skip(1).filter_map(|variant| {
+    let compared = variants().into_iter().filter(|variant| *variant != variant.reference());
+    let told = compared.filter_map(|variant| {
         let errors: Vec<(f64, f64)> = errors_over(study, name_of(variant), INCIDENCE).collect();
         let ((_, first), (_, last)) = (errors.first()?, errors.last()?);
         let (at, most) = errors.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -279,16 +292,23 @@ fn findings(study: &Study, drawn: &[DrawnFrame]) -> Vec<String> {
     let variants = variants();
     let mut costs = Vec::new();
     let mut nearest: Option<(&str, f64)> = None;
-    for (place, &variant) in variants.iter().enumerate().skip(1) {
+    for (place, &variant) in variants.iter().enumerate() {
+        let phong = variants.iter().position(|other| *other == variant.reference()).unwrap_or(place);
+        if phong == place {
+            continue;
+        }
         let name = name_of(variant);
         // Pairs of times from the same round, for all exponents.
-        let pairs = drawn.chunks(variants.len()).flat_map(|all| all[place].times.iter().zip(&all[0].times));
+        let pairs =
+            drawn.chunks(variants.len()).flat_map(|all| all[place].times.iter().zip(&all[phong].times));
         let ratios: Vec<f64> = pairs.map(|(time, of_phong)| time / of_phong.max(1e-9)).collect();
         if let Some(ratio) = Spread::of_median(&ratios) {
-            costs.push(format!("{name} takes {} of Phong's time", factor(&ratio)));
+            let of =
+                if variant.lobe == Lobe::Bare { "Phong's time" } else { "the time of Phong with this lobe" };
+            costs.push(format!("{name} takes {} of {of}", factor(&ratio)));
         }
         let largest = errors_over(study, name, EXPONENT).map(|(_, error)| error).fold(0.0, f64::max);
-        if nearest.is_none_or(|(_, least)| largest < least) {
+        if variant.lobe == Lobe::Bare && nearest.is_none_or(|(_, least)| largest < least) {
             nearest = Some((name, largest));
         }
     }
