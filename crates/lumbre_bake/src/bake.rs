@@ -10,7 +10,6 @@ use crate::apply::apply;
 use crate::baked_scene::BakedScene;
 use crate::checkpoint::CheckpointFile;
 use crate::chunks::decide;
-use crate::content_hash::hashes_of;
 use crate::coverage::CoveredTexels;
 use crate::direct_light::{SHORT_OF_TIME, direct_light};
 use crate::final_gather::rounds;
@@ -23,11 +22,11 @@ use crate::monitor::{BakeMonitor, Callback};
 use crate::probes;
 use crate::radiosity::patch_light::patch_light;
 use crate::radiosity::{Exchange, Patches};
-use crate::rebake::{Reuse, Samples, reused_gather};
+use crate::rebake::{Rebake, Samples};
 use crate::scene::{StaticScene, from_world};
 use crate::stage::Stage;
 use crate::summary;
-use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, Progress, prepare};
+use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Progress, prepare};
 
 /// Configures and runs a bake, which computes the light on the static objects of a scene and stores it in lightmaps.
 ///
@@ -169,9 +168,7 @@ impl<'a> Bake<'a> {
         let mut bake = || {
             let monitor = BakeMonitor::new(&mut *self.progress, options.time);
             let mut monitor = monitor.cancelled_by(self.cancel.clone());
-            let (mut baked, samples) = run(scene, &self.request, &mut monitor)?;
-            summary::finish(&mut baked.report, &mut monitor);
-            Ok((baked, samples))
+            around_stages(scene, &self.request, &mut monitor)
         };
         let (baked, samples) = match options.threads {
             None => bake()?,
@@ -195,60 +192,70 @@ struct Request<'a> {
     keeps_samples: bool,
 }
 
-/// Runs the stages in order. Each takes values that earlier stages have returned, and its notes go into the report. Also
-/// returns the samples for the next bake, if they are requested.
-fn run(
+/// A bake with what stands around its stages: the former bake, the checkpoint and the clock. Also returns the samples for
+/// the next bake, if they are requested.
+fn around_stages(
     input: &Arc<StaticScene>,
     request: &Request<'_>,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(BakedScene, Option<Samples>), BakeError> {
-    let options = &request.options;
     monitor.stage(Stage::Layout)?;
-    let reuse = request.prepare_reuse(input, monitor)?;
-    let mut report = BakeReport {
-        content_hash: reuse.content_hash().to_string(),
-        threads: rayon::current_num_threads(),
-        rebake: reuse.refusal(),
-        ..BakeReport::default()
-    };
-    if input.objects.is_empty() {
-        return Ok((BakedScene::dark("the scene has no static mesh", report), None));
+    let mut rebake = Rebake::new(request.former, request.keeps_samples, input, &request.options, monitor)?;
+    if let Some(checkpoint) = request.checkpoint {
+        let opened = CheckpointFile::open(checkpoint, &rebake.identity);
+        monitor.checkpoint =
+            opened.map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })?;
     }
-    let (space, density) = (reuse.space(input), reuse.density(input, options));
-    let layout = report.noted(prepare::layout(input, space, density, options, monitor)?);
+    let mut baked = run(input, &mut rebake, &request.options, monitor)?;
+    let samples = rebake.finish(&mut baked.report);
+    summary::finish(&mut baked.report, monitor);
+    Ok((baked, samples))
+}
+
+/// Runs the stages in order. Each takes values that earlier stages have returned, and its notes go into the report.
+/// Two of them skip what `rebake` knows already, which is nothing without a former bake.
+fn run(
+    input: &Arc<StaticScene>,
+    rebake: &mut Rebake<'_>,
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<BakedScene, BakeError> {
+    let mut report = BakeReport::default();
+    if input.objects.is_empty() {
+        return Ok(BakedScene::dark("the scene has no static mesh", report));
+    }
+    let plan = rebake.plan();
+    let layout = report.noted(prepare::layout(input, &plan, options, monitor)?);
 
     monitor.stage(Stage::Hierarchy)?;
-    let (scene, layout, emitters) = report.noted(prepare::scene(input, layout, space, monitor)?);
+    let (scene, layout, emitters) = report.noted(prepare::scene(input, layout, plan.space, monitor)?);
     report.triangles = scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate).count();
     let sources = report.noted(prepare::sources(input, &scene, emitters, monitor)?);
     if sources.is_empty() {
         let why = "no surface emits, no light is static or mixed, and there is no sky";
-        return Ok((BakedScene::dark(why, report), None));
+        return Ok(BakedScene::dark(why, report));
     }
-    let sample_bytes = request.sample_bytes(reuse.is_possible());
-    memory::check_texels(&scene, &layout, sample_bytes, options)?;
+    memory::check_texels(&scene, &layout, plan.sample_bytes, options)?;
 
     monitor.stage(Stage::DirectLight)?;
     let texels = report.noted(CoveredTexels::new(&scene, &layout, monitor)?);
     let is_time_short = monitor.clock().is_past(SHORT_OF_TIME);
     let patch_options = options.for_patches(decide(monitor, is_time_short)?);
     let resolution = report.noted(
-        monitor.run_interruptible(1.0, || memory::resolution(&texels, sample_bytes, &patch_options))??,
+        monitor
+            .run_interruptible(1.0, || memory::resolution(&texels, plan.sample_bytes, &patch_options))??,
     );
-    let changes = monitor.run_interruptible(1.0, || reuse.changes(&input.objects, &sources, &texels))?;
-    let known = changes.as_ref().map_or(&[][..], |changes| &changes.known_direct);
-    let direct = report.noted(direct_light(&sources, &texels, known, options, monitor)?);
+    let known = rebake.known_direct_light(&sources, &texels, monitor)?;
+    let direct = report.noted(direct_light(&sources, &texels, &known, options, monitor)?);
 
     let patch_light = |patches: &Patches| patch_light(&texels, &direct, patches);
     let (exchange, exchanged) =
         report.noted(Exchange::new(&sources, &patch_options, resolution, patch_light, monitor)?);
-    let reused = match (&exchange, &changes) {
-        (Some((exchange, factors)), Some(changes)) => {
-            let exchange = (exchange, factors);
-            let reused = reused_gather(changes, &sources, &texels, &direct, exchange, options, monitor)?;
-            Some(report.noted(reused))
+    let reused = match &exchange {
+        Some((exchange, factors)) => {
+            report.noted(rebake.reused_gather(&sources, &texels, &direct, exchange, factors, monitor)?)
         }
-        _ => None,
+        None => None,
     };
     let exchange = exchange.map(|(exchange, _)| exchange);
     let (indirect, gathered, cache) = match &exchange {
@@ -256,14 +263,8 @@ fn run(
         Some(exchange) => {
             monitor.stage(Stage::FinalGather)?;
             let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, monitor)?;
-            let (indirect, gathered) = report.noted(rounds::gather(
-                &mut cache,
-                &texels,
-                &direct,
-                reused.as_ref(),
-                options,
-                monitor,
-            )?);
+            let (indirect, gathered) =
+                report.noted(rounds::gather(&mut cache, &texels, &direct, reused, options, monitor)?);
             (indirect, Some(gathered), Some(cache))
         }
     };
@@ -275,48 +276,11 @@ fn run(
     let lit = LitTexels { texels: &texels, direct: &direct, indirect: &indirect, light: &light };
     summary::write_stages(&lit, &resolution, exchanged, volume.as_ref(), &mut report);
     summary::write_errors(&lit, gathered, &input.objects, options, monitor, &mut report)?;
-    if let Some(changes) = &changes {
-        report.rebake = Some(changes.report(&texels, reused.as_ref(), report.mean_of_channels()));
-    }
-    let samples = match request.keeps_samples && report.ended != Ended::Time {
-        // Samples that were cut short would not be good enough for a later bake that has more time.
-        false => None,
-        true => Some(monitor.run_interruptible(0.0, || {
-            let exitance = exchange.as_ref().map(|exchange| exchange.exitance_of(&scene, layout.maps.len()));
-            reuse.samples(&lit, reused.as_ref(), &input.objects, &sources, &exitance.unwrap_or_default())
-        })?),
-    };
+    rebake.record(&lit, &sources, exchange.as_ref(), &report, monitor)?;
     let mean = report.mean_of_channels();
     let finished = finished_maps(&lit, &points, mean, &input.objects, options, monitor)?;
     let FinishedMaps { objects, maps, atlases, seams, resolution } = report.noted(finished);
     report = BakeReport { maps: maps.len(), atlases, seams, resolution, ..report };
-    let volume = volume.map(|placed| (placed.grid.transform(space), placed.volume));
-    Ok((BakedScene { objects, maps, volume, report }, samples))
-}
-
-impl Request<'_> {
-    /// Hashes the scene, decides whether samples of a previous bake can be used, and opens the checkpoint.
-    fn prepare_reuse(
-        &self,
-        input: &StaticScene,
-        monitor: &mut BakeMonitor<'_>,
-    ) -> Result<Reuse<'_>, BakeError> {
-        let hashes = monitor.run_interruptible(0.0, || hashes_of(input, &self.options))?;
-        // Samples take memory. If that is limited, fewer patches may fit beside them, and the light would differ.
-        let limited = self.options.memory.is_some() && self.sample_bytes(self.former.is_some()) > 0;
-        let reuse = Reuse::new(self.former, hashes, limited, input, &self.options);
-        if let Some(checkpoint) = self.checkpoint {
-            let opened = CheckpointFile::open(checkpoint, &reuse.identity);
-            monitor.checkpoint =
-                opened.map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })?;
-        }
-        Ok(reuse)
-    }
-
-    /// Bytes per covered texel for samples: those that this bake returns, and those of the previous bake if they are
-    /// used.
-    fn sample_bytes(&self, uses_former: bool) -> u64 {
-        let returned = if self.keeps_samples { memory::SAMPLES_BYTES } else { 0 };
-        returned + if uses_former { memory::FORMER_SAMPLES_BYTES } else { 0 }
-    }
+    let volume = volume.map(|placed| (placed.grid.transform(plan.space), placed.volume));
+    Ok(BakedScene { objects, maps, volume, report })
 }

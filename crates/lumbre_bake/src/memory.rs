@@ -10,7 +10,6 @@ use crate::denoise::{Estimates, Nearness};
 use crate::error::mebibytes;
 use crate::final_gather::{GatherSums, TexelRadiance};
 use crate::radiosity::{Patch, Patches, Resolution};
-use crate::rebake::TexelSamples;
 use crate::report::StageNotes;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::sources::Direct;
@@ -74,15 +73,6 @@ const GUIDED_PATCH_BYTES: u64 =
 /// probability, in lists that may have grown to twice their length. What the guide learns between rounds doubles that, but
 /// by then the form factors themselves are freed, which need as much.
 const GUIDE_PAIR_BYTES: u64 = 2 * 2 * 2 * (4 + 4);
-
-/// Per covered texel, for the samples that the bake returns.
-pub(crate) const SAMPLES_BYTES: u64 = size_of::<TexelSamples>() as u64;
-
-/// Per covered texel, for the samples of a previous bake: the samples themselves, the sums and direct light reused from
-/// them, the change of its light, and its light and direct light in the previous bake.
-pub(crate) const FORMER_SAMPLES_BYTES: u64 =
-    (size_of::<TexelSamples>() + size_of::<GatherSums>() + size_of::<Option<Direct>>() + 8 + 4 + 4 + 4 * 12)
-        as u64;
 
 /// Memory that is not counted above: threads, buffers, the checkpoint's block.
 const OTHER_BYTES: u64 = 32 << 20;

@@ -19,6 +19,7 @@ pub(crate) fn finish(report: &mut BakeReport, monitor: &mut BakeMonitor<'_>) {
     monitor.checkpoint.flush();
     report.stages = std::mem::take(&mut monitor.stages);
     report.seconds = monitor.seconds();
+    report.threads = rayon::current_num_threads();
     // Only now does a map with that error exist.
     if !report.curve.is_empty() {
         report.curve.push(ErrorAtTime { seconds: report.seconds, error: report.estimated_error });

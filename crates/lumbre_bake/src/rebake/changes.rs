@@ -10,12 +10,11 @@ use super::changed_box::ChangedBox;
 use super::direct_light_invalidation::{ShadowVolumes, shadowed};
 use super::fingerprints::{bounds, emission, fingerprint, first_triangles, layouts};
 use super::samples::{Content, ObjectSamples, TexelSamples};
+use crate::BakeOptions;
 use crate::content_hash::{ContentHash, Hashes};
 use crate::coverage::CoveredTexels;
-use crate::final_gather::ReusedGather;
 use crate::scene::{Canonical, SceneObject, density_of};
 use crate::sources::{Direct, Sources};
-use crate::{BakeOptions, RebakeReport};
 
 /// With more changed objects than this the whole scene is baked.
 const MAX_CHANGED: usize = 64;
@@ -92,8 +91,6 @@ pub(crate) struct Changes<'a> {
     pub names: Vec<String>,
     /// Per covered texel, its former samples, if it still shows the same surface.
     pub known: Vec<Option<&'a TexelSamples>>,
-    /// Per covered texel, its former direct light, if that cannot have changed.
-    pub known_direct: Vec<Option<Direct>>,
     /// Per texel of all maps, the irradiance of the former bake, W/m²; NaN where that is not known.
     pub former_light: Vec<Vec3>,
 }
@@ -143,14 +140,7 @@ impl<'a> Changes<'a> {
         let (known, former_light) = known(texels, &unchanged);
         let nothing_changed = former.content == hashes.content;
         let lights_changed = emitters_changed || lights_or_sky_changed;
-        let unless_shadowed = |(known, is_shadowed): (&Option<&TexelSamples>, bool)| {
-            known.filter(|_| !is_shadowed).map(|known| known.direct)
-        };
         let shadow_volumes = ShadowVolumes::new(sources, &boxes);
-        let known_direct = match lights_changed {
-            true => vec![None; texels.list.len()],
-            false => known.iter().zip(shadowed(texels, &shadow_volumes)).map(unless_shadowed).collect(),
-        };
         Self {
             former,
             nothing_changed,
@@ -160,24 +150,19 @@ impl<'a> Changes<'a> {
             lights_changed,
             names,
             known,
-            known_direct,
             former_light,
         }
     }
 
-    /// What is kept of the former bake, of whose light by bounces that is `kept`. `mean` is the mean irradiance, mean of
-    /// the channels, W/m².
-    pub fn report(&self, texels: &CoveredTexels<'_>, kept: Option<&ReusedGather>, mean: f64) -> RebakeReport {
-        let open = texels.open().count();
-        let error = kept.map_or(0.0, |kept| kept.error(open));
-        RebakeReport {
-            whole: String::new(),
-            changed: self.names.clone(),
-            texels: open,
-            relit: texels.open().filter(|(texel, _)| self.known_direct[texel.place()].is_none()).count(),
-            gathered: kept.map_or(0, |kept| open - kept.count()),
-            neglected: if mean > 0.0 { error / mean } else { 0.0 },
+    /// Per covered texel, its former direct light, if that cannot have changed.
+    pub fn known_direct_light(&self, texels: &CoveredTexels<'_>) -> Vec<Option<Direct>> {
+        if self.lights_changed {
+            return vec![None; texels.list.len()];
         }
+        let unless_shadowed = |(known, is_shadowed): (&Option<&TexelSamples>, bool)| {
+            known.filter(|_| !is_shadowed).map(|known| known.direct)
+        };
+        self.known.iter().zip(shadowed(texels, &self.shadow_volumes)).map(unless_shadowed).collect()
     }
 }
 

@@ -18,7 +18,7 @@ use super::estimate::{Estimate, Range, cone_to_sphere, direction_in_cone};
 use crate::bounds::Bounds;
 use crate::chunks::in_chunks;
 use crate::coverage::{CoveredTexels, Texel, TexelGroups, receiver};
-use crate::direct_light::{DirectLight, LocalLight};
+use crate::direct_light::LocalLight;
 use crate::final_gather::ReusedGather;
 use crate::monitor::BakeMonitor;
 use crate::radiosity::solution::gather;
@@ -39,34 +39,8 @@ const NEAR_BOX: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
-/// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The
-/// notes count about how many rays it took to decide.
-pub(crate) fn reused_gather(
-    changes: &Changes<'_>,
-    sources: &Sources<'_>,
-    texels: &CoveredTexels<'_>,
-    direct: &DirectLight,
-    (exchange, factors): (&Exchange, &FormFactors),
-    options: &BakeOptions,
-    monitor: &mut BakeMonitor<'_>,
-) -> Result<(ReusedGather, StageNotes), BakeError> {
-    let change =
-        monitor.run_interruptible(1.0, || IndirectChange::new(sources, changes, texels, &direct.texels))?;
-    let unknown = if changes.nothing_changed { Vec::new() } else { change.unknown_backs(&exchange.patches) };
-    let light = PatchLight {
-        patches: &exchange.patches,
-        exitance: &exchange.exitance,
-        change: &[],
-        unknown: &unknown,
-    };
-    let of_patches = change.of_patches(light, factors, options, monitor)?;
-    let light = PatchLight { change: &of_patches, ..light };
-    let reused = change.keep(light, &direct.local, options, monitor)?;
-    Ok((reused, StageNotes::of_rays(change.rays(&of_patches))))
-}
-
 /// The light before and after, as far as the estimate needs it.
-struct IndirectChange<'a> {
+pub(super) struct IndirectChange<'a> {
     scene: &'a BakeScene,
     texels: &'a CoveredTexels<'a>,
     changes: &'a Changes<'a>,
@@ -93,7 +67,7 @@ struct PatchLight<'a> {
 
 impl<'a> IndirectChange<'a> {
     /// `direct` is the direct light of every covered texel in the new scene.
-    fn new(
+    pub fn new(
         sources: &Sources<'a>,
         changes: &'a Changes<'a>,
         texels: &'a CoveredTexels<'a>,
@@ -116,10 +90,32 @@ impl<'a> IndirectChange<'a> {
         }
     }
 
-    /// About how many rays the estimate took.
-    fn rays(&self, of_patches: &[Range]) -> u64 {
-        let origins = if of_patches.is_empty() { 0 } else { of_patches.len() + self.blocks.members.len() };
-        u64::from(RAYS) * origins as u64
+    /// The light by bounces of the former bake that this one keeps, given the new scene's `exchange` with its form
+    /// factors. The notes count about how many rays it took to decide.
+    pub fn kept(
+        &self,
+        exchange: &Exchange,
+        factors: &FormFactors,
+        local: &LocalLight,
+        options: &BakeOptions,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<(ReusedGather, StageNotes), BakeError> {
+        if self.changes.nothing_changed {
+            return Ok((choice::keep_all(self.changes), StageNotes::default()));
+        }
+        let unknown = self.unknown_backs(&exchange.patches);
+        let light = PatchLight {
+            patches: &exchange.patches,
+            exitance: &exchange.exitance,
+            change: &[],
+            unknown: &unknown,
+        };
+        let of_patches = self.of_patches(light, factors, options, monitor)?;
+        let light = PatchLight { change: &of_patches, ..light };
+        let of_texels = self.of_texels(light, options, monitor)?;
+        let reused = choice::choose(self.changes, &self.texels.list, &of_texels, local, options.error);
+        let origins = of_patches.len() + self.blocks.members.len();
+        Ok((reused, StageNotes::of_rays(u64::from(RAYS) * origins as u64)))
     }
 
     /// The change of each patch's irradiance by bounces, W/m²: Δ = S + F ρ Δ, where S is the immediate change. F and ρ
@@ -131,9 +127,6 @@ impl<'a> IndirectChange<'a> {
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<Range>, BakeError> {
-        if self.changes.nothing_changed {
-            return Ok(Vec::new());
-        }
         let (patches, solver) = (light.patches, options.solver);
         let is_new = |patch: &Patch| {
             self.changes.changed[self.scene.triangles[patch.triangle as usize].object as usize]
@@ -189,21 +182,6 @@ impl<'a> IndirectChange<'a> {
                     || self.changes.shadow_volumes.cross(&patches.corners(self.scene, patch)))
         };
         patches.list.par_iter().map(is_unknown).collect()
-    }
-
-    /// Chooses what is kept of the light by bounces.
-    fn keep(
-        &self,
-        light: PatchLight<'_>,
-        local: &LocalLight,
-        options: &BakeOptions,
-        monitor: &mut BakeMonitor<'_>,
-    ) -> Result<ReusedGather, BakeError> {
-        if self.changes.nothing_changed {
-            return Ok(choice::keep_all(self.changes));
-        }
-        let change = self.of_texels(light, options, monitor)?;
-        Ok(choice::choose(self.changes, &self.texels.list, &change, local, options.error))
     }
 
     /// By how much the light by bounces may have changed at every covered texel, W/m², root mean square of the
