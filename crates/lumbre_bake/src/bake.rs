@@ -11,21 +11,22 @@ use crate::baked_scene::BakedScene;
 use crate::checkpoint::CheckpointFile;
 use crate::chunks::decide;
 use crate::coverage::CoveredTexels;
-use crate::direct_light::{SHORT_OF_TIME, direct_light};
+use crate::direct_light::{DirectLight, SHORT_OF_TIME, direct_light};
 use crate::final_gather::rounds;
-use crate::final_gather::{IndirectLight, LitTexels, RadianceCache};
-use crate::finish::FinishedMaps;
-use crate::finish::finished_maps::finished_maps;
-use crate::finish::resolution_error::dense_points;
+use crate::final_gather::{GatherReport, IndirectLight, LitTexels, RadianceCache};
+use crate::finish::finished_maps::{filled_maps, finished_maps};
+use crate::finish::resolution_error::{self, DensePoint};
 use crate::memory;
 use crate::monitor::{BakeMonitor, Callback};
-use crate::probes;
+use crate::probes::{self, PlacedVolume};
 use crate::radiosity::patch_light::patch_light;
-use crate::radiosity::{Exchange, Patches};
+use crate::radiosity::{Exchange, ExchangeReport, PatchResolution, Transport};
 use crate::rebake::{Rebake, Samples};
+use crate::report::StageNotes;
 use crate::scene::{StaticScene, from_world};
+use crate::sources::Sources;
 use crate::stage::Stage;
-use crate::summary;
+use crate::summary::{self, LightFigures};
 use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Progress, prepare};
 
 /// Configures and runs a bake, which computes the light on the static objects of a scene and stores it in lightmaps.
@@ -239,48 +240,123 @@ fn run(
 
     monitor.stage(Stage::DirectLight)?;
     let texels = report.noted(CoveredTexels::new(&scene, &layout, monitor)?);
-    let is_time_short = monitor.clock().is_past(SHORT_OF_TIME);
-    let patch_options = options.for_patches(decide(monitor, is_time_short)?);
-    let resolution = report.noted(
-        monitor
-            .run_interruptible(1.0, || memory::resolution(&texels, plan.sample_bytes, &patch_options))??,
-    );
+    let patch_resolution = report.noted(patch_resolution(&texels, plan.sample_bytes, options, monitor)?);
     let known = rebake.known_direct_light(&sources, &texels, monitor)?;
     let direct = report.noted(direct_light(&sources, &texels, &known, options, monitor)?);
 
-    let patch_light = |patches: &Patches| patch_light(&texels, &direct, patches);
-    let (exchange, exchanged) =
-        report.noted(Exchange::new(&sources, &patch_options, resolution, patch_light, monitor)?);
-    let reused = match &exchange {
-        Some((exchange, factors)) => {
-            report.noted(rebake.reused_gather(&sources, &texels, &direct, exchange, factors, monitor)?)
-        }
-        None => None,
-    };
-    let exchange = exchange.map(|(exchange, _)| exchange);
-    let (indirect, gathered, cache) = match &exchange {
-        None => (IndirectLight::none(&texels, &direct), None, None),
-        Some(exchange) => {
-            monitor.stage(Stage::FinalGather)?;
-            let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, monitor)?;
-            let (indirect, gathered) =
-                report.noted(rounds::gather(&mut cache, &texels, &direct, reused, options, monitor)?);
-            (indirect, Some(gathered), Some(cache))
-        }
-    };
-    let volume = report.noted(probes::bake(input, &scene, &sources, cache.as_ref(), options, monitor)?);
-    let points = report.noted(dense_points(&sources, cache.as_ref(), report.rays, options, monitor)?);
+    let bounces = bounces(&sources, &texels, &direct, &patch_resolution, rebake, options, monitor)?;
+    let Bounces { indirect, cache, exchanged, gathered } = report.noted(bounces);
+    let volume = report.noted(volume(input, &sources, cache.as_ref(), options, monitor)?);
+    let points = report.noted(points(&sources, cache.as_ref(), report.rays, options, monitor)?);
 
     monitor.stage(Stage::Texels)?;
     let light = indirect.with(&direct);
     let lit = LitTexels { texels: &texels, direct: &direct, indirect: &indirect, light: &light };
-    summary::write_stages(&lit, &resolution, exchanged, volume.as_ref(), &mut report);
-    summary::write_errors(&lit, gathered, &input.objects, options, monitor, &mut report)?;
-    rebake.record(&lit, &sources, exchange.as_ref(), &report, monitor)?;
+    let (volume_figures, patch_resolution) = (volume.as_ref(), &patch_resolution);
+    let figures = LightFigures { patch_resolution, exchanged, gathered, volume: volume_figures };
+    summary::write_light(&lit, figures, &input.objects, options, monitor, &mut report)?;
+    rebake.record(&lit, &sources, cache.as_ref().map(|cache| &cache.exchange), &report, monitor)?;
+    let filled = filled_maps(&lit, options.gap, monitor)?;
+
+    monitor.stage(Stage::Seams)?;
     let mean = report.mean_of_channels();
-    let finished = finished_maps(&lit, &points, mean, &input.objects, options, monitor)?;
-    let FinishedMaps { objects, maps, atlases, seams, resolution } = report.noted(finished);
-    report = BakeReport { maps: maps.len(), atlases, seams, resolution, ..report };
+    let finished = finished_maps(&lit, filled, &points, mean, &input.objects, options, monitor)?;
+    let finished = report.noted(finished);
+    summary::write_maps(&finished, &mut report);
     let volume = volume.map(|placed| (placed.grid.transform(plan.space), placed.volume));
-    Ok(BakedScene { objects, maps, volume, report })
+    Ok(BakedScene { objects: finished.objects, maps: finished.maps, volume, report })
+}
+
+/// How finely light is exchanged: as the quality and the memory allow, and coarser if time is short, so that most of it is
+/// left for the final gather.
+fn patch_resolution(
+    texels: &CoveredTexels<'_>,
+    sample_bytes: u64,
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(PatchResolution, StageNotes), BakeError> {
+    let is_time_short = monitor.clock().is_past(SHORT_OF_TIME);
+    let options = options.for_patches(decide(monitor, is_time_short)?);
+    monitor.run_interruptible(1.0, || memory::patch_resolution(texels, sample_bytes, &options))?
+}
+
+/// The light by bounces of all covered texels.
+struct Bounces<'a> {
+    indirect: IndirectLight,
+    /// The light that leaves surfaces, for rays of later stages; `None` where nothing bounces, as are the figures of the
+    /// gather.
+    cache: Option<RadianceCache<'a>>,
+    exchanged: ExchangeReport,
+    gathered: Option<GatherReport>,
+}
+
+/// Exchanges light between patches, and gathers it at the covered texels.
+fn bounces<'a>(
+    sources: &'a Sources<'a>,
+    texels: &CoveredTexels<'a>,
+    direct: &DirectLight,
+    resolution: &PatchResolution,
+    rebake: &mut Rebake<'_>,
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(Bounces<'a>, StageNotes), BakeError> {
+    let mut notes = StageNotes::default();
+    monitor.stage(Stage::FormFactors)?;
+    let transport = notes.noted(Transport::new(sources.scene, resolution, options, monitor)?);
+    let exchange = match transport.is_black() {
+        true => monitor.run_interruptible(0.5, || Exchange::black(sources, transport))?,
+        false => {
+            monitor.stage(Stage::Radiosity)?;
+            let known = monitor.run_interruptible(0.1, || patch_light(texels, direct, &transport.patches))?;
+            Exchange::new(sources, transport, &known, options, monitor)?
+        }
+    };
+    let (exchange, exchanged) = notes.noted(exchange);
+    let Some((exchange, factors)) = exchange else {
+        let indirect = IndirectLight::none(texels, direct);
+        return Ok((Bounces { indirect, cache: None, exchanged, gathered: None }, notes));
+    };
+    let reused = rebake.reused_gather(sources, texels, direct, &exchange, &factors, monitor)?;
+    let reused = notes.noted(reused);
+    // They are large, and the gather needs memory.
+    drop(factors);
+
+    monitor.stage(Stage::FinalGather)?;
+    let mut cache = RadianceCache::new(sources, texels, direct, exchange, options, monitor)?;
+    let gathered = rounds::gather(&mut cache, texels, direct, reused, options, monitor)?;
+    let (indirect, gathered) = notes.noted(gathered);
+    Ok((Bounces { indirect, cache: Some(cache), exchanged, gathered: Some(gathered) }, notes))
+}
+
+/// The irradiance probes; `None` where they are not wanted, or would be dark.
+fn volume(
+    input: &StaticScene,
+    sources: &Sources<'_>,
+    cache: Option<&RadianceCache<'_>>,
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(Option<PlacedVolume>, StageNotes), BakeError> {
+    let emitters = match probes::emitters_of_probes(input, sources, cache.is_some(), options) {
+        Ok(emitters) => emitters,
+        Err(why) => return Ok((None, StageNotes::of_skipped(format!("probes: {why}")))),
+    };
+    monitor.stage(Stage::Probes)?;
+    let (volume, notes) = probes::bake(input, &emitters, cache, options, monitor)?;
+    Ok((Some(volume), notes))
+}
+
+/// The points at which the finished maps' resolution is measured; none where it is not. `rays` is how many rays the bake
+/// has cast so far.
+fn points(
+    sources: &Sources<'_>,
+    cache: Option<&RadianceCache<'_>>,
+    rays: u64,
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(Vec<DensePoint>, StageNotes), BakeError> {
+    if let Some(why) = resolution_error::why_left_out(options, monitor.clock()) {
+        return Ok((Vec::new(), StageNotes::of_skipped(format!("resolution error: {why}"))));
+    }
+    monitor.stage(Stage::Resolution)?;
+    resolution_error::dense_points(sources, cache, rays, options, monitor)
 }

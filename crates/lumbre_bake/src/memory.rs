@@ -9,7 +9,7 @@ use crate::denoise::texel_rows::BESIDE_A_ROW;
 use crate::denoise::{Estimates, Nearness};
 use crate::error::mebibytes;
 use crate::final_gather::{GatherSums, TexelRadiance};
-use crate::radiosity::{Patch, Patches, Resolution};
+use crate::radiosity::{Patch, PatchResolution, Patches};
 use crate::report::StageNotes;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::sources::Direct;
@@ -104,17 +104,18 @@ pub(crate) fn check_texels(
 ///
 /// # Errors
 /// [`BakeError::Memory`] if even the coarsest resolution does not fit.
-pub(crate) fn resolution(
+pub(crate) fn patch_resolution(
     texels: &CoveredTexels<'_>,
     sample_bytes: u64,
     options: &BakeOptions,
-) -> Result<(Resolution, StageNotes), BakeError> {
+) -> Result<(PatchResolution, StageNotes), BakeError> {
     let effort = options.effort();
     let CoveredTexels { scene, layout, list: texels, contacts, side: texel_side, .. } = texels;
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let requested_rays = effort.form_factor_rays(texels.len(), options.error);
-    let mut resolution = Resolution { patch_side: side, form_factor_rays: requested_rays, memory_bytes: 0 };
+    let mut resolution =
+        PatchResolution { patch_side: side, form_factor_rays: requested_rays, memory_bytes: 0 };
     let triangles = scene.triangles.len() as u64;
     let covered = texels.len() as u64;
     let footprint_points = texels.iter().map(|texel| match &texel.footprint {
@@ -162,7 +163,7 @@ pub(crate) fn resolution(
 }
 
 /// Bytes for the patches, their form factors and the sampling guide.
-fn exchange_bytes(resolution: &Resolution, patches: u64) -> u64 {
+fn exchange_bytes(resolution: &PatchResolution, patches: u64) -> u64 {
     // Every patch casts a minimum of rays, however small it is. There can be no more pairs than pairs of patches.
     let rays = (resolution.form_factor_rays as u64 + 32 * patches).min(patches.saturating_mul(patches));
     // The guide's regions are no more than the patches, and their pairs no more than those of the patches.

@@ -299,6 +299,16 @@ impl StageNotes {
     }
 }
 
+impl StageNotes {
+    /// The result of a step, whose notes are added to these.
+    pub fn noted<T>(&mut self, (result, notes): (T, StageNotes)) -> T {
+        self.rays += notes.rays;
+        self.warnings.extend(notes.warnings);
+        self.skipped.extend(notes.skipped);
+        result
+    }
+}
+
 impl BakeReport {
     /// The result of a stage, whose notes are added to the report.
     pub(crate) fn noted<T>(&mut self, (result, notes): (T, StageNotes)) -> T {

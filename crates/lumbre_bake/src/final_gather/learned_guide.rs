@@ -4,8 +4,8 @@
 //! Novák, "Practical Path Guiding for Efficient Light-Transport Simulation", 2017). The guide itself is in
 //! `radiosity::sampling_guide`.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -41,7 +41,7 @@ pub(crate) fn learn(cache: &mut RadianceCache<'_>, texels: &[Texel], gathered: &
     }
     cache.discoveries.sort_by_key(|discovery| discovery.receiver);
     gathered.par_iter_mut().for_each(|sums| sums.unguided = UnguidedLight::default());
-    cache.guide = Cow::Owned(cache.exchange.guide.with(&cache.discoveries));
+    cache.guide = Arc::new(cache.exchange.guide.with(&cache.discoveries));
 }
 
 /// Whether one of a texel's samples outweighs the others, and the guide would hardly have led to it.

@@ -1,7 +1,7 @@
 //! The light that leaves surfaces, for the gather's rays to read: direct light by texel, light by bounces by patch or,
 //! once a round has gathered it, by texel. Not the rays: they are `gather`'s and `incident`'s.
 
-use std::borrow::Cow;
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -23,13 +23,13 @@ pub(crate) struct RadianceCache<'a> {
     pub sources: &'a Sources<'a>,
     pub layout: &'a LightmapLayout,
     /// The light of patches, for points whose texel has none.
-    pub exchange: &'a Exchange,
+    pub exchange: Exchange,
     /// The light and the reflectance of texels.
     pub texels: TexelRadiances,
     /// Radius on a surface within which the errors that rounds leave in texels are correlated, canonical units.
     pub correlation_radius: f32,
     /// Which regions the light of each region comes from: as the patches know it, and with all `discoveries`.
-    pub guide: Cow<'a, SamplingGuide>,
+    pub guide: Arc<SamplingGuide>,
     /// What the rounds have found so far that the patches' guide had missed.
     pub discoveries: Vec<Discovery>,
     /// Samples of each replicate in the first round.
@@ -46,7 +46,7 @@ impl<'a> RadianceCache<'a> {
         sources: &'a Sources<'a>,
         texels: &CoveredTexels<'a>,
         direct: &DirectLight,
-        exchange: &'a Exchange,
+        exchange: Exchange,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
@@ -64,8 +64,8 @@ impl<'a> RadianceCache<'a> {
             scene,
             sources,
             layout: texels.layout,
+            guide: Arc::clone(&exchange.guide),
             exchange,
-            guide: Cow::Borrowed(&exchange.guide),
             discoveries: Vec::new(),
             first_round_samples: effort.gather[0] / REPLICATES as u32,
         })

@@ -11,12 +11,11 @@ use crate::chunks::in_chunks;
 use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel, receiver};
 use crate::denoise::REPLICATES;
 use crate::final_gather::{GatherSums, RadianceCache};
-use crate::monitor::BakeMonitor;
+use crate::monitor::{BakeMonitor, Clock};
 use crate::report::{ResolutionReport, StageNotes};
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
 use crate::scene::{Receiver, SurfaceHit};
 use crate::sources::Sources;
-use crate::stage::Stage;
 use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions};
 
@@ -47,8 +46,15 @@ pub(crate) struct DensePoint {
     pub rays: u64,
 }
 
-/// The points that the finished map is compared with; none if the comparison is switched off, or the time is up.
-/// `cache` is `None` where nothing bounces; `rays` is how many rays the bake has cast so far.
+/// Why the error of the map's resolution is not measured; `None` if it is.
+pub(crate) fn why_left_out(options: &BakeOptions, clock: Clock) -> Option<&'static str> {
+    match options.resolution_error {
+        false => Some("switched off"),
+        true => clock.is_over().then_some("the time is up"),
+    }
+}
+
+/// The points that the finished map is compared with. `cache` is `None` where nothing bounces; `rays` is how many rays the bake has cast so far.
 pub(crate) fn dense_points(
     sources: &Sources<'_>,
     cache: Option<&RadianceCache<'_>>,
@@ -56,11 +62,6 @@ pub(crate) fn dense_points(
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(Vec<DensePoint>, StageNotes), BakeError> {
-    if !options.resolution_error || monitor.clock().is_over() {
-        let why = if options.resolution_error { "the time is up" } else { "switched off" };
-        return Ok((Vec::new(), StageNotes::of_skipped(format!("resolution error: {why}"))));
-    }
-    monitor.stage(Stage::Resolution)?;
     let baker = PointBaker { sources, cache };
     let points = baker.bake_points(rays, options, monitor)?;
     let notes = StageNotes::of_rays(points.iter().map(|point| point.rays).sum());

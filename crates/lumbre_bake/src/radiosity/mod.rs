@@ -25,11 +25,13 @@ pub(crate) mod size_error;
 pub(crate) mod solution;
 pub(crate) mod solver;
 pub(crate) mod stationary;
+pub(crate) mod transport;
 mod triangle_cells;
 mod unseen_regions;
 
-pub(crate) use exchange::{Exchange, ExchangeReport, Resolution};
+pub(crate) use exchange::{Exchange, ExchangeReport};
 pub(crate) use form_factors::FormFactors;
 pub(crate) use patch_index::PatchIndex;
 pub(crate) use patches::{Patch, Patches};
 pub(crate) use sampling_guide::{Discovery, GuidedPatch, Region, RowPart, SamplingGuide};
+pub(crate) use transport::{PatchResolution, Transport};

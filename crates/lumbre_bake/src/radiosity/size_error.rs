@@ -9,7 +9,7 @@ use super::form_factors::FormFactors;
 use super::larger_patches::LargerPatches;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
-use super::solution::gather;
+use super::solution::{TOLERANCE, gather};
 use crate::options::Solver;
 use crate::scene::BakeScene;
 
@@ -18,21 +18,29 @@ const COARSER: f32 = 2.0;
 /// The power of the patches' size with which the error falls, measured in rooms.
 const ORDER: f64 = 1.2;
 
-/// The signed error of each patch's irradiance by bounces, for one channel's (or the mean) reflectances and irradiance
-/// by direct light and sky (`first`, W/m²); `side` is that of `patches`.
+/// The radiosity system of the mean of the channels.
+pub(crate) struct MeanSystem {
+    pub solver: Solver,
+    /// Per patch.
+    pub reflectance: Vec<f64>,
+    /// Irradiance of each patch by direct light and sky, W/m².
+    pub first: Vec<f64>,
+}
+
+/// The signed error of each patch's irradiance by bounces; `side` is that of `patches`.
 pub(crate) fn size_error(
     scene: &BakeScene,
     patches: &Patches,
     side: f32,
     factors: &FormFactors,
-    (reflectance, first): (&[f64], &[f64]),
-    (solver, tolerance): (Solver, f64),
+    system: &MeanSystem,
 ) -> Vec<f32> {
+    let MeanSystem { solver, reflectance, first } = system;
     let Some(larger) = LargerPatches::new(scene, patches, COARSER * side) else {
         return vec![0.0; patches.list.len()];
     };
     let emission: Vec<f64> = reflectance.iter().zip(first).map(|(rho, light)| rho * light).collect();
-    let fine = gather(factors, &solver.solve(factors, reflectance, &emission, tolerance).radiosity);
+    let fine = gather(factors, &solver.solve(factors, reflectance, &emission, TOLERANCE).radiosity);
     // Integrals over the larger patches, and means weighted by area.
     let areas: Vec<f64> = factors.areas.iter().map(|&area| f64::from(area)).collect();
     let integral = |value: &dyn Fn(usize) -> f64| {
@@ -49,7 +57,7 @@ pub(crate) fn size_error(
     };
     let coarse_factors = larger_factors(factors, &larger, &larger_areas);
     let solution =
-        solver.solve(&coarse_factors, &mean(&|i| reflectance[i]), &mean(&|i| emission[i]), tolerance);
+        solver.solve(&coarse_factors, &mean(&|i| reflectance[i]), &mean(&|i| emission[i]), TOLERANCE);
     let coarse = gather(&coarse_factors, &solution.radiosity);
     let fine = mean(&|i| fine[i]);
     // The error of the finer solution as a share of the difference between the two.
