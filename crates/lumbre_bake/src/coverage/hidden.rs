@@ -65,7 +65,7 @@ pub(crate) fn remove_hidden(
     divided.iter().for_each(|texel| is_suspect[texel.place()] = true);
     // The few rays of a texel may miss a hidden corner that its neighbours' rays have found.
     for (texel, _) in texels.iter().zip(&suspicious).filter(|(_, suspicious)| **suspicious) {
-        let map = &layout.maps[texel.object as usize];
+        let map = &layout.maps[texel.map.place()];
         map.neighbourhood(texel.x, texel.y, 1).for_each(|near| is_suspect[near.place()] = true);
     }
     let mut suspects: Vec<&mut Texel> =

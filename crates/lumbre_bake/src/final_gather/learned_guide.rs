@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::gather_sums::{GatherSums, UnguidedLight};
 use super::radiance_cache::RadianceCache;
 use crate::coverage::Texel;
-use crate::radiosity::{Discovery, PatchIndex, Region};
+use crate::radiosity::{Discovery, PatchIndex, RegionIndex};
 use crate::scene::Side;
 
 /// A sample counts as a discovery if it brought more than this multiple of the mean sample of its texel.
@@ -24,9 +24,9 @@ pub(crate) fn learn(cache: &mut RadianceCache<'_>, texels: &[Texel], gathered: &
         return;
     }
     // Per receiving region, all its light, and the light by patch that was discovered.
-    let mut light_of_regions: BTreeMap<Region, (f64, BTreeMap<PatchIndex, f64>)> = BTreeMap::new();
+    let mut light_of_regions: BTreeMap<RegionIndex, (f64, BTreeMap<PatchIndex, f64>)> = BTreeMap::new();
     let region = |texel: &Texel| region_of(cache, texel);
-    let regions: Vec<Option<Region>> = texels.par_iter().map(region).collect();
+    let regions: Vec<Option<RegionIndex>> = texels.par_iter().map(region).collect();
     for (region, sums) in regions.into_iter().zip(&mut *gathered) {
         let Some(region) = region else { continue };
         let (total, discovered) = light_of_regions.entry(region).or_default();
@@ -51,7 +51,7 @@ fn has_discovery(sums: &GatherSums) -> bool {
 }
 
 /// The region of the guide in which the middle of a texel lies.
-fn region_of(cache: &RadianceCache<'_>, texel: &Texel) -> Option<Region> {
+fn region_of(cache: &RadianceCache<'_>, texel: &Texel) -> Option<RegionIndex> {
     if texel.is_hidden() {
         return None;
     }

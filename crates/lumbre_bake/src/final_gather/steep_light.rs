@@ -24,7 +24,7 @@ const SAMPLES: u32 = 1;
 pub(crate) fn steep_texels(texels: &CoveredTexels<'_>, direct: &[Vec3], local: &LocalLight) -> Vec<bool> {
     let mut steep = vec![false; direct.len()];
     for (covered, texel) in texels.open() {
-        let map = &texels.layout.maps[texel.object as usize];
+        let map = &texels.layout.maps[texel.map.place()];
         let light = |near: MapTexel| channel_mean(direct[near.place()]);
         let around = map.neighbourhood(texel.x, texel.y, 1).map(light).filter(|light| light.is_finite());
         let (least, most) =

@@ -222,7 +222,7 @@ fn hidden(layout: &LightmapLayout, texels: &[Texel], reach: u32) -> Vec<Hidden> 
         hidden[texel.index.place()] = Hidden::Deep;
     }
     for texel in texels {
-        let map = &layout.maps[texel.object as usize];
+        let map = &layout.maps[texel.map.place()];
         for (x, y) in map.around(texel.x, texel.y, reach) {
             let other = &mut hidden[map.texel(x, y).place()];
             if *other == Hidden::Deep {

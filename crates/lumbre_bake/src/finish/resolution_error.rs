@@ -16,7 +16,7 @@ use crate::report::{ResolutionReport, StageNotes};
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
 use crate::scene::{Receiver, SurfaceHit};
 use crate::sources::Sources;
-use crate::texel_index::MapTexel;
+use crate::texel_index::{MapIndex, MapTexel};
 use crate::{BakeError, BakeOptions};
 
 /// The points get one part in this many of the bake's rays, and never fewer than take no noticeable time.
@@ -125,10 +125,10 @@ impl PointBaker<'_> {
             point.rays += u64::from(light.rays);
         }
         let Some(cache) = self.cache else { return point };
-        // A texel of this one point, with an object number and a seed of its own, so that it shares its samples with no
+        // A texel of this one point, with a map and a seed of its own, so that it shares its samples with no
         // other.
         let footprint = Footprint::Points(vec![footprint]);
-        let texel = Texel { index: MapTexel(index), object: index, x: 0, y: 0, triangle, footprint };
+        let texel = Texel { index: MapTexel(index), map: MapIndex(index), x: 0, y: 0, triangle, footprint };
         let mut gathered = GatherSums::default();
         cache.gather(&texel, &mut gathered, GATHER_RAYS, hash(seed ^ Stream::ResolutionPoints.number()));
         let [a, b, c, d] = gathered.sums.map(|sum| sum / GATHER_RAYS as f32);
@@ -200,7 +200,7 @@ fn look_up(
     point: &DensePoint,
 ) -> Option<(Vec3, f32)> {
     let triangle = &texels.scene.triangles[point.triangle as usize];
-    let map = &texels.layout.maps[triangle.object as usize];
+    let map = &texels.layout.maps[triangle.map.place()];
     let at = triangle.place_on_map(point.at) - 0.5;
     if !at.is_finite() {
         return None;

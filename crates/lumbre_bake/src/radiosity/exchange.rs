@@ -153,7 +153,7 @@ impl Exchange {
         let mut ranges = vec![[Vec3::INFINITY, Vec3::ZERO]; objects];
         for (patch, exitance) in self.patches.list.iter().zip(&self.exitance) {
             let triangle = &scene.triangles[patch.triangle as usize];
-            let [least, most] = &mut ranges[triangle.object as usize];
+            let [least, most] = &mut ranges[triangle.map.place()];
             let has_black_back = !triangle.closed && !triangle.two_sided;
             *least = least.min(if has_black_back { Vec3::ZERO } else { *exitance });
             *most = most.max(*exitance);

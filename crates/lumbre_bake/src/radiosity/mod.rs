@@ -31,7 +31,7 @@ mod unseen_regions;
 
 pub(crate) use exchange::{Exchange, ExchangeReport};
 pub(crate) use form_factors::FormFactors;
-pub(crate) use patch_index::PatchIndex;
+pub(crate) use patch_index::{PatchIndex, RegionIndex};
 pub(crate) use patches::{Patch, Patches};
-pub(crate) use sampling_guide::{Discovery, GuidedPatch, Region, RowPart, SamplingGuide};
+pub(crate) use sampling_guide::{Discovery, GuidedPatch, RowPart, SamplingGuide};
 pub(crate) use transport::{PatchResolution, Transport};

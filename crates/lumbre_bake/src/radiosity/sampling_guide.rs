@@ -11,14 +11,10 @@ use glam::Vec3;
 
 use super::form_factors::FormFactors;
 use super::larger_patches::LargerPatches;
-use super::patch_index::PatchIndex;
+use super::patch_index::{PatchIndex, RegionIndex};
 use super::patches::Patches;
 use super::unseen_regions::UnseenRegions;
 use crate::scene::BakeScene;
-
-/// A region of the guide, by its place among all regions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Region(u32);
 
 /// For each region, the regions that light it by bounces, with probabilities in proportion to the irradiance that they
 /// contribute; and for each region its patches, with probabilities in proportion to the light that leaves them.
@@ -38,7 +34,7 @@ pub(crate) struct SamplingGuide {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Discovery {
     /// The region that receives the light.
-    pub receiver: Region,
+    pub receiver: RegionIndex,
     /// Where it comes from.
     pub patch: PatchIndex,
     /// Its share of all light by bounces and by the sky that the region receives.
@@ -57,7 +53,7 @@ struct Member {
 /// canonical unit.
 #[derive(Clone, Copy, Debug)]
 struct PatchInRegion {
-    region: Region,
+    region: RegionIndex,
     density: f32,
 }
 
@@ -115,10 +111,10 @@ impl SamplingGuide {
             })
             .collect();
         let unseen = UnseenRegions::new(scene, &larger, REGION_SIDE * side, &radiosity_of_regions);
-        let share_and_row = |members: &[PatchIndex], exchange: Vec<(PatchIndex, f64)>| {
-            let mut flux: Vec<(u32, f64)> = exchange
+        let share_and_row = |members: &[PatchIndex], exchange: Vec<(RegionIndex, f64)>| {
+            let mut flux: Vec<(RegionIndex, f64)> = exchange
                 .iter()
-                .map(|(region, g)| (region.0, g * radiosity_of_regions[region.place()]))
+                .map(|&(region, g)| (region, g * radiosity_of_regions[region.place()]))
                 .collect();
             let by_bounces: f64 = flux.iter().map(|(_, flux)| flux).sum();
             let sky_flux = |member: &PatchIndex| {
@@ -133,7 +129,7 @@ impl SamplingGuide {
             if let Some(first) = members.first() {
                 unseen.add(larger.of[first.place()], &exchange, &mut flux);
             }
-            (share, cumulative(flux))
+            (share, cumulative(flux.into_iter().map(|(region, flux)| (region.0, flux)).collect()))
         };
         let distributions = larger.rows(factors, share_and_row);
         let mut rows = Rows::new(distributions.len());
@@ -142,11 +138,7 @@ impl SamplingGuide {
         let mut guide = Self {
             rows,
             members: Vec::with_capacity(patches.list.len()),
-            patches: larger
-                .of
-                .iter()
-                .map(|region| PatchInRegion { region: Region(region.0), density: 0.0 })
-                .collect(),
+            patches: larger.of.iter().map(|&region| PatchInRegion { region, density: 0.0 }).collect(),
             unseen,
             ..Self::empty()
         };
@@ -208,16 +200,16 @@ impl SamplingGuide {
                 true => (rounded_share(total.min(1.0)).max(1.0 / SHARE_STEPS), total),
                 false => (share, total.min(MAX_DISCOVERED)),
             };
-            let mut new: BTreeMap<u32, f64> = BTreeMap::new();
+            let mut new: BTreeMap<RegionIndex, f64> = BTreeMap::new();
             for (region, share) in discovered.iter().flat_map(|discovery| self.spread(discovery)) {
                 *new.entry(region).or_default() += share;
             }
-            let mut new: Vec<(u32, f64)> = new.into_iter().collect();
+            let mut new: Vec<(RegionIndex, f64)> = new.into_iter().collect();
             new.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
             new.truncate(known.len().max(MIN_NEW_ENTRIES));
             let total = new.iter().map(|(_, share)| share).sum::<f64>();
             let mut weights: BTreeMap<u32, f64> =
-                new.into_iter().map(|(region, share)| (region, weight * share / total)).collect();
+                new.into_iter().map(|(region, share)| (region.0, weight * share / total)).collect();
             let mut start = 0.0;
             for entry in known {
                 *weights.entry(entry.column).or_default() += (1.0 - weight) * f64::from(entry.end - start);
@@ -235,31 +227,31 @@ impl SamplingGuide {
     }
 
     /// The regions to which a discovery leads, with their parts of its share.
-    fn spread(&self, discovery: &Discovery) -> Vec<(u32, f64)> {
+    fn spread(&self, discovery: &Discovery) -> Vec<(RegionIndex, f64)> {
         let origin = self.patches[discovery.patch.place()].region;
-        let near = self.unseen.around(PatchIndex(discovery.receiver.0), PatchIndex(origin.0));
+        let near = self.unseen.around(discovery.receiver, origin);
         let power: f64 = near.iter().map(|(_, power)| power).sum();
         if power.is_nan() || power <= 0.0 {
-            return vec![(origin.0, discovery.share)];
+            return vec![(origin, discovery.share)];
         }
         let half = 0.5 * discovery.share;
-        let of_near = near.into_iter().map(|(region, near_power)| (region.0, half * near_power / power));
-        of_near.chain([(origin.0, half)]).collect()
+        let of_near = near.into_iter().map(|(region, near_power)| (region, half * near_power / power));
+        of_near.chain([(origin, half)]).collect()
     }
 
     /// The region of a patch; `None` if the guide knows nothing of it.
-    pub fn region_of(&self, patch: PatchIndex) -> Option<Region> {
+    pub fn region_of(&self, patch: PatchIndex) -> Option<RegionIndex> {
         self.patches.get(patch.place()).map(|patch| patch.region)
     }
 
     /// The share of the samples at a region that the guide places, in [0, 1); `None` if according to the solution no
     /// light arrives there by bounces.
-    pub fn share(&self, region: Region) -> Option<f32> {
+    pub fn share(&self, region: RegionIndex) -> Option<f32> {
         self.rows.share(region.0)
     }
 
     /// Where to search for `u` in [0, 1) in the distribution of the regions that light `region`.
-    pub fn near(&self, region: Region, u: f32) -> RowPart {
+    pub fn near(&self, region: RegionIndex, u: f32) -> RowPart {
         self.rows.near(region.0, u)
     }
 
@@ -277,7 +269,7 @@ impl SamplingGuide {
     }
 
     /// Where to search for the region of `patch` in the distribution of the regions that light `region`.
-    pub fn near_patch(&self, region: Region, patch: PatchIndex) -> RowPart {
+    pub fn near_patch(&self, region: RegionIndex, patch: PatchIndex) -> RowPart {
         let other = self.patches[patch.place()].region;
         self.rows.near_column(region.0, other.0)
     }
@@ -480,7 +472,7 @@ mod tests {
     fn patches_are_chosen_by_the_light_that_leaves_them() {
         // Two regions: patches 0 to 2 of unequal light and area, and patch 3.
         let (weights, areas) = ([1.0, 0.0, 3.0, 1.0], [1.0, 1.0, 2.0, 4.0]);
-        let patches = [0, 0, 0, 1].map(|region| PatchInRegion { region: Region(region), density: 0.0 });
+        let patches = [0, 0, 0, 1].map(|region| PatchInRegion { region: RegionIndex(region), density: 0.0 });
         let mut rows = Rows::new(2);
         rows.push(0.4, &cumulative(vec![(0, 3.0), (1, 1.0)]));
         let mut guide = SamplingGuide { rows, patches: patches.to_vec(), ..SamplingGuide::empty() };
@@ -508,14 +500,14 @@ mod tests {
 
     #[test]
     fn what_is_discovered_becomes_a_part_of_the_distribution() {
-        let patches = [0, 1, 2].map(|region| PatchInRegion { region: Region(region), density: 0.0 });
+        let patches = [0, 1, 2].map(|region| PatchInRegion { region: RegionIndex(region), density: 0.0 });
         let mut rows = Rows::new(3);
         rows.push(0.25, &cumulative(vec![(0, 3.0), (1, 1.0)]));
         rows.push(0.25, &cumulative(vec![(0, 1.0)]));
         rows.push(0.0, &[]);
         let guide = SamplingGuide { rows, patches: patches.to_vec(), ..SamplingGuide::empty() };
         let discovery = |receiver, patch, share| Discovery {
-            receiver: Region(receiver),
+            receiver: RegionIndex(receiver),
             patch: PatchIndex(patch),
             share,
         };

@@ -7,7 +7,7 @@
 
 use super::form_factors::FormFactors;
 use super::larger_patches::LargerPatches;
-use super::patch_index::PatchIndex;
+use super::patch_index::{PatchIndex, RegionIndex};
 use super::patches::Patches;
 use super::solution::{TOLERANCE, gather};
 use crate::options::Solver;
@@ -62,15 +62,16 @@ pub(crate) fn size_error(
     let fine = mean(&|i| fine[i]);
     // The error of the finer solution as a share of the difference between the two.
     let share = 1.0 / (f64::from(COARSER).powf(ORDER) - 1.0);
-    let error = |large: &PatchIndex| (share * (coarse[large.place()] - fine[large.place()])) as f32;
+    let error = |large: &RegionIndex| (share * (coarse[large.place()] - fine[large.place()])) as f32;
     larger.of.iter().map(error).collect()
 }
 
 /// The form factors between the larger patches, which have these areas.
 fn larger_factors(factors: &FormFactors, larger: &LargerPatches, areas: &[f64]) -> FormFactors {
     let mut coarse = FormFactors { starts: vec![0], stop: factors.stop.clone(), ..FormFactors::default() };
-    let to_f32 =
-        |row: Vec<(PatchIndex, f64)>| row.into_iter().map(|(larger, g)| (larger, g as f32)).collect();
+    // In this system the larger patches are the patches.
+    let entry = |(larger, g): (RegionIndex, f64)| (PatchIndex(larger.0), g as f32);
+    let to_f32 = |row: Vec<(RegionIndex, f64)>| row.into_iter().map(entry).collect();
     let rows: Vec<Vec<(PatchIndex, f32)>> = larger.rows(factors, |_, row| to_f32(row));
     rows.into_iter().for_each(|row| coarse.push_row(row));
     coarse.areas = areas.iter().map(|&area| area.max(f64::from(f32::MIN_POSITIVE)) as f32).collect();

@@ -203,7 +203,7 @@ fn known<'a>(
         .list
         .iter()
         .map(|texel| {
-            let object = texel.object as usize;
+            let object = texel.map.place();
             let list = &unchanged[object].filter(|_| !texel.is_hidden())?.texels;
             let cell = texel.y * layout.maps[object].width + texel.x;
             let samples = &list[list.binary_search_by_key(&cell, |samples| samples.cell).ok()?];

@@ -12,7 +12,7 @@ use crate::sources::Sources;
 pub(crate) fn bounds(texels: &CoveredTexels<'_>) -> Vec<Bounds<Vec3>> {
     let mut bounds = vec![Bounds::default(); texels.layout.maps.len()];
     for triangle in &texels.scene.triangles {
-        bounds[triangle.object as usize].extend(triangle.corners);
+        bounds[triangle.map.place()].extend(triangle.corners);
     }
     bounds
 }
@@ -22,7 +22,7 @@ pub(crate) fn emission(sources: &Sources<'_>, texels: &CoveredTexels<'_>) -> Vec
     let first = first_triangles(texels);
     let mut emission = vec![0; texels.layout.maps.len()];
     for emitter in &sources.emitters {
-        let object = texels.scene.triangles[emitter.triangle as usize].object as usize;
+        let object = texels.scene.triangles[emitter.triangle as usize].map.place();
         let radiance = emitter.radiance.to_array().map(f32::to_bits);
         let words = radiance.into_iter().chain([emitter.triangle - first[object], emitter.side as u32]);
         emission[object] = words.fold(emission[object], fold).max(1);
@@ -35,7 +35,7 @@ pub(crate) fn layouts(texels: &CoveredTexels<'_>) -> Vec<u32> {
     let maps = texels.layout.maps.iter();
     let mut sums: Vec<u32> = maps.map(|map| fold(fold(0, map.width), map.height)).collect();
     for triangle in &texels.scene.triangles {
-        let sum = &mut sums[triangle.object as usize];
+        let sum = &mut sums[triangle.map.place()];
         for uv in triangle.uv {
             *sum = fold(fold(*sum, uv.x.to_bits()), uv.y.to_bits());
         }
@@ -67,7 +67,7 @@ pub(crate) fn fingerprint(texel: &Texel, first: u32) -> u32 {
 pub(crate) fn first_triangles(texels: &CoveredTexels<'_>) -> Vec<u32> {
     let mut first = vec![u32::MAX; texels.layout.maps.len()];
     for (index, triangle) in texels.scene.triangles.iter().enumerate() {
-        let first = &mut first[triangle.object as usize];
+        let first = &mut first[triangle.map.place()];
         *first = (*first).min(index as u32);
     }
     first

@@ -128,9 +128,8 @@ impl<'a> IndirectChange<'a> {
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<Range>, BakeError> {
         let (patches, solver) = (light.patches, options.solver);
-        let is_new = |patch: &Patch| {
-            self.changes.changed[self.scene.triangles[patch.triangle as usize].object as usize]
-        };
+        let is_new =
+            |patch: &Patch| self.changes.changed[self.scene.triangles[patch.triangle as usize].map.place()];
         let immediate: Vec<Range> = in_chunks(patches.list.len(), monitor, |index| {
             let patch = &patches.list[index];
             if is_new(patch) || patch.reflectance == Vec3::ZERO {
@@ -282,7 +281,7 @@ impl<'a> IndirectChange<'a> {
     /// The change of the light that arrives along a ray, as radiance times π. `None` if it is not known.
     fn change_along(&self, origin: Vec3, direction: Vec3, light: PatchLight<'_>) -> Option<Range> {
         let is_new =
-            |triangle: u32| self.changes.changed[self.scene.triangles[triangle as usize].object as usize];
+            |triangle: u32| self.changes.changed[self.scene.triangles[triangle as usize].map.place()];
         let is_black = |hit| matches!(hit, SurfaceHit::Back | SurfaceHit::Inside);
         let now = self.scene.first_surface(origin, direction, |_| true);
         let shows_new = matches!(now, SurfaceHit::Lit { triangle, .. } if is_new(triangle));

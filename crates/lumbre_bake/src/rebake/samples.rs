@@ -134,7 +134,7 @@ impl TexelSamples {
         let first = first_triangles(texels);
         let mut by_object: Vec<Vec<Self>> = vec![Vec::new(); texels.layout.maps.len()];
         for (covered, texel) in texels.open() {
-            let (index, object) = (covered.place(), texel.object as usize);
+            let (index, object) = (covered.place(), texel.map.place());
             let samples = Self {
                 cell: texel.y * texels.layout.maps[object].width + texel.x,
                 footprint: fingerprint(texel, first[object]),

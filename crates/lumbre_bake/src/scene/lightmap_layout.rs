@@ -62,7 +62,7 @@ pub(crate) struct LightmapLayout {
 impl LightmapLayout {
     /// The texel at a point of a triangle; `None` if the point lies outside of its map.
     pub fn texel_at(&self, triangle: &SceneTriangle, at: (f32, f32)) -> Option<MapTexel> {
-        let map = &self.maps[triangle.object as usize];
+        let map = &self.maps[triangle.map.place()];
         let place = triangle.place_on_map(at);
         let (x, y) = (place.x as u32, place.y as u32);
         (x < map.width && y < map.height).then(|| map.texel(x, y))

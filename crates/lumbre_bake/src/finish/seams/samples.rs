@@ -121,8 +121,8 @@ impl Sampling<'_> {
             }
             let uv = [(long, s), (short, t)].map(|(edge, t)| edge.uv[0].lerp(edge.uv[1], t));
             let scene = self.texels.scene;
-            let objects = [long, short].map(|edge| scene.triangles[edge.triangle as usize].object);
-            if objects[0] == objects[1] && (uv[0] - uv[1]).abs().max_element() < SAME_READING {
+            let maps = [long, short].map(|edge| scene.triangles[edge.triangle as usize].map);
+            if maps[0] == maps[1] && (uv[0] - uv[1]).abs().max_element() < SAME_READING {
                 continue;
             }
             let (Some(long_reading), Some(short_reading)) =
@@ -146,7 +146,7 @@ impl Sampling<'_> {
     /// What bilinear filtering reads at a place of a map, if all its texels are known and none is another chart's.
     fn reading(&self, edge: &Edge, uv: Vec2) -> Option<Reading> {
         let triangle = &self.texels.scene.triangles[edge.triangle as usize];
-        let map = &self.texels.layout.maps[triangle.object as usize];
+        let map = &self.texels.layout.maps[triangle.map.place()];
         let chart = self.texels.charts[edge.triangle as usize];
         let at = uv - 0.5;
         let low = at.floor();
