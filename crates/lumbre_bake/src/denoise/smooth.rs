@@ -174,7 +174,7 @@ mod tests {
     use fearless_simd::Level;
     use glam::Vec2;
 
-    use super::super::neighbours::tests::{random_channels, random_grid};
+    use super::super::neighbours_tests::{random_channels, random_grid};
     use super::super::surface::Surface;
     use super::*;
 

@@ -136,7 +136,7 @@ fn falloff<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
 mod tests {
     use fearless_simd::Level;
 
-    use super::super::neighbours::tests::{random_channels, random_grid};
+    use super::super::neighbours_tests::{random_channels, random_grid};
     use super::super::texel_rows::{LANES, MARGIN};
     use super::*;
     use crate::denoise::surface::{NONE, is_continuous};

@@ -3,15 +3,16 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::steep_light::steep_texels;
 use super::texel_radiance::{TexelRadiances, mean_reflectances};
-use crate::coverage::CoveredTexels;
+use crate::coverage::{CoveredTexels, FootprintPoint, receiver};
 use crate::denoise::REPLICATES;
 use crate::direct_light::DirectLight;
 use crate::monitor::BakeMonitor;
 use crate::radiosity::{Discovery, Exchange, SamplingGuide};
+use crate::sampling::Sequence;
 use crate::scene::{BakeScene, LightmapLayout, Side};
 use crate::sources::Sources;
 use crate::texel_index::MapTexel;
@@ -39,6 +40,9 @@ pub(crate) struct RadianceCache<'a> {
 /// Radius, in texels, of the disc over which the errors that smoothing leaves are correlated: 4.1 after the first round
 /// of the demo level, 5.4 after the second.
 const CORRELATED_TEXELS: f32 = 4.5;
+
+/// Shadow rays to each lamp from a point whose texel's direct light is steep.
+const STEEP_LIGHT_SAMPLES: u32 = 1;
 
 impl<'a> RadianceCache<'a> {
     /// The cache before the first round: direct light of texels, light by bounces of patches.
@@ -83,6 +87,15 @@ impl RadianceCache<'_> {
         let direct = texel.direct().unwrap_or_else(|| self.exchange.direct[patch.place()]);
         let irradiance = direct + indirect;
         self.reflectance_at(triangle, side, at) * irradiance
+    }
+
+    /// The direct irradiance (mixed lights included) at a point of a front, W/m², and the rays that it took: where that of
+    /// the texel is steep.
+    pub(crate) fn direct_light_at(&self, triangle: u32, at: (f32, f32), sequence: Sequence) -> (Vec3, u32) {
+        let point = FootprintPoint { triangle, at, offset: Vec2::ZERO };
+        let receiver = receiver(self.scene, &point);
+        let direct = self.sources.irradiance(sequence, STEEP_LIGHT_SAMPLES, &|_, _| Some(receiver));
+        (direct.total(), direct.rays)
     }
 
     /// The reflectance at a point of a surface.
