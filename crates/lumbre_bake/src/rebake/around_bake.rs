@@ -3,7 +3,7 @@
 //! what is kept: that is `choice`.
 
 use super::changes::Changes;
-use super::fingerprints::{bounds, emission, layouts};
+use super::fingerprints::ObjectPrints;
 use super::indirect_change;
 use super::samples::{Content, ObjectSamples, Samples, TexelSamples};
 use crate::content_hash::{ContentHash, Hashes, hashes_of};
@@ -37,6 +37,8 @@ pub(crate) struct Rebake<'a> {
     keeps_samples: bool,
     /// Hash of everything that the bits of this bake follow from, former bakes included.
     pub identity: ContentHash,
+    /// `None` before it is needed.
+    prints: Option<ObjectPrints>,
     /// What differs from the former bake; `None` before it is known, or without a former bake.
     changes: Option<Changes<'a>>,
     /// The light by bounces that is kept; `None` before it is known, or without a former bake.
@@ -76,8 +78,20 @@ impl<'a> Rebake<'a> {
         };
         let identity = if is_limited { identity.made_from(&hashes.sampling) } else { identity };
         let report = refusal.map(|whole| RebakeReport { whole, ..RebakeReport::default() });
-        let (changes, reused, samples) = (None, None, None);
-        Ok(Self { input, options, hashes, former, keeps_samples, identity, changes, reused, report, samples })
+        let (prints, changes, reused, samples) = (None, None, None, None);
+        Ok(Self {
+            input,
+            options,
+            hashes,
+            former,
+            keeps_samples,
+            identity,
+            prints,
+            changes,
+            reused,
+            report,
+            samples,
+        })
     }
 
     /// Space and density of the former bake, so that texels stay where they were; without one, the scene's own space and
@@ -100,17 +114,20 @@ impl<'a> Rebake<'a> {
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<Option<Direct>>, BakeError> {
         let Some(former) = self.former else { return Ok(Vec::new()) };
-        let objects = &self.input.objects;
-        let changes = monitor
-            .run_interruptible(1.0, || Changes::find(former, &self.hashes, objects, sources, texels))?;
-        let known = changes.known_direct_light(texels);
+        let (objects, hashes) = (&self.input.objects, &self.hashes);
+        let (prints, changes, known) = monitor.run_interruptible(1.0, || {
+            let prints = ObjectPrints::new(sources, texels);
+            let changes = Changes::find(former, hashes, objects, &prints, sources, texels);
+            let known = changes.known_direct_light(texels);
+            (prints, changes, known)
+        })?;
         self.report = Some(RebakeReport {
             changed: changes.names.clone(),
             texels: texels.open().count(),
             relit: texels.open().filter(|(texel, _)| known[texel.place()].is_none()).count(),
             ..RebakeReport::default()
         });
-        self.changes = Some(changes);
+        (self.prints, self.changes) = (Some(prints), Some(changes));
         Ok(known)
     }
 
@@ -151,7 +168,11 @@ impl<'a> Rebake<'a> {
         }
         // Samples that were cut short would not be good enough for a later bake that has more time.
         if self.keeps_samples && report.ended != Ended::Time {
-            let samples = monitor.run_interruptible(0.0, || self.samples_of(lit, sources, exchange))?;
+            let prints = self.prints.take();
+            let samples = monitor.run_interruptible(0.0, || {
+                let prints = prints.unwrap_or_else(|| ObjectPrints::new(sources, lit.texels));
+                self.samples_of(lit, sources, &prints, exchange)
+            })?;
             self.samples = Some(samples);
         }
         Ok(())
@@ -164,23 +185,28 @@ impl<'a> Rebake<'a> {
         self.samples
     }
 
-    fn samples_of(&self, lit: &LitTexels<'_>, sources: &Sources<'_>, exchange: Option<&Exchange>) -> Samples {
+    fn samples_of(
+        &self,
+        lit: &LitTexels<'_>,
+        sources: &Sources<'_>,
+        prints: &ObjectPrints,
+        exchange: Option<&Exchange>,
+    ) -> Samples {
         let LitTexels { texels, .. } = lit;
-        let (bounds, emission, layouts) = (bounds(texels), emission(sources, texels), layouts(texels));
         let exitance = exchange
             .map(|exchange| exchange.exitance_of(texels.scene, texels.layout.maps.len()))
             .unwrap_or_default();
         let of_object = |(index, texels): (usize, Vec<TexelSamples>)| ObjectSamples {
             hash: self.hashes.objects[index],
             name: self.input.objects[index].name.clone(),
-            bounds: bounds[index],
-            emission: emission[index],
+            bounds: prints.bounds[index],
+            emission: prints.emission[index],
             exitance: exitance.get(index).copied().unwrap_or_default(),
-            layout: layouts[index],
+            layout: prints.layouts[index],
             texels,
         };
         let reuse_error = self.reused.as_ref().map_or(&[][..], |reused| &reused.reuse_error);
-        let by_object = TexelSamples::by_object(lit, reuse_error);
+        let by_object = TexelSamples::by_object(lit, &prints.first_triangles, reuse_error);
         Samples(Content {
             content: self.hashes.content,
             identity: self.identity,

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::changed_box::ChangedBox;
 use super::direct_light_invalidation::{ShadowVolumes, shadowed};
-use super::fingerprints::{bounds, emission, fingerprint, first_triangles, layouts};
+use super::fingerprints::{ObjectPrints, fingerprint};
 use super::samples::{Content, ObjectSamples, TexelSamples};
 use crate::BakeOptions;
 use crate::content_hash::{ContentHash, Hashes};
@@ -101,6 +101,7 @@ impl<'a> Changes<'a> {
         former: &'a Content,
         hashes: &Hashes,
         objects: &[SceneObject],
+        prints: &ObjectPrints,
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
     ) -> Self {
@@ -113,8 +114,8 @@ impl<'a> Changes<'a> {
         let unchanged: Vec<Option<&'a ObjectSamples>> = hashes
             .objects
             .iter()
-            .zip(layouts(texels))
-            .map(|(hash, layout)| by_hash.get_mut(hash)?.pop_if(|object| object.layout == layout))
+            .zip(&prints.layouts)
+            .map(|(hash, layout)| by_hash.get_mut(hash)?.pop_if(|object| object.layout == *layout))
             .collect();
         let gone: Vec<&ObjectSamples> = former
             .objects
@@ -122,22 +123,20 @@ impl<'a> Changes<'a> {
             .filter(|object| !unchanged.iter().flatten().any(|other| std::ptr::eq(*other, *object)))
             .collect();
         let changed: Vec<bool> = unchanged.iter().map(Option::is_none).collect();
-        let emission = emission(sources, texels);
         let differs = |(emission, former): (&u32, &Option<&ObjectSamples>)| {
             *emission != former.map_or(0, |former| former.emission)
         };
         let emitters_changed =
-            emission.iter().zip(&unchanged).any(differs) || gone.iter().any(|gone| gone.emission != 0);
+            prints.emission.iter().zip(&unchanged).any(differs) || gone.iter().any(|gone| gone.emission != 0);
         let lights_or_sky_changed = former.lights != hashes.lights;
-        let bounds = bounds(texels);
-        let after = bounds.into_iter().zip(&changed).filter(|(_, changed)| **changed);
-        let after = after.map(|(bounds, _)| ChangedBox { bounds, former_exitance: None });
+        let after = prints.bounds.iter().zip(&changed).filter(|(_, changed)| **changed);
+        let after = after.map(|(&bounds, _)| ChangedBox { bounds, former_exitance: None });
         let before = gone
             .iter()
             .map(|object| ChangedBox { bounds: object.bounds, former_exitance: Some(object.exitance) });
         let boxes: Vec<ChangedBox> = after.chain(before).filter(|b| !b.bounds.is_empty()).collect();
         let names = names(objects, &changed, &gone, lights_or_sky_changed);
-        let (known, former_light) = known(texels, &unchanged);
+        let (known, former_light) = known(texels, &prints.first_triangles, &unchanged);
         let nothing_changed = former.content == hashes.content;
         let lights_changed = emitters_changed || lights_or_sky_changed;
         let shadow_volumes = ShadowVolumes::new(sources, &boxes);
@@ -185,12 +184,13 @@ fn names(objects: &[SceneObject], changed: &[bool], gone: &[&ObjectSamples], lig
 }
 
 /// The former samples of every covered texel that still shows the same surface, and the former irradiance per texel of
-/// all maps. `unchanged` holds the former samples of each object that has not changed.
+/// all maps. `first` holds each object's first triangle, `unchanged` the former samples of each object that has not changed.
 fn known<'a>(
     texels: &CoveredTexels<'_>,
+    first: &[u32],
     unchanged: &[Option<&'a ObjectSamples>],
 ) -> (Vec<Option<&'a TexelSamples>>, Vec<Vec3>) {
-    let (layout, first) = (texels.layout, first_triangles(texels));
+    let layout = texels.layout;
     let mut light = vec![Vec3::NAN; layout.texels];
     for (map, object) in layout.maps.iter().zip(unchanged) {
         for texel in object.iter().flat_map(|object| &object.texels) {
