@@ -23,7 +23,7 @@ const TRIANGLE_BYTES: u64 =
     (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32) as u64;
 
 /// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
-/// round, raw and smoothed estimates with their guides, its nearness, nineteen lists of one number each for the
+/// round, raw and smoothed estimates with their features, its nearness, nineteen lists of one number each for the
 /// errors and what a round aims at, its chart, the light around it, and its block with its share of what is in view
 /// from there. (The sums of the shared samples of direct light need less, and are freed by then.)
 const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
@@ -36,7 +36,7 @@ const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + 7 * 4) as u64;
 
 /// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later:
-/// estimates with their bias, the numbers of the weighted fit, guides with the noise, products, and nearness. Besides,
+/// estimates with their bias, the numbers of the weighted fit, features with the noise, products, and nearness. Besides,
 /// its place among the covered texels and its surface, and what rays that hit it read.
 const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 3) + 8 + size_of::<TexelRadiance>() as u64;
 

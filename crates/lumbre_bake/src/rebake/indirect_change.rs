@@ -11,10 +11,10 @@ use std::f32::consts::{PI, TAU};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::change_sums::{ChangeSums, Range, cone_to_sphere, direction_in_cone};
 use super::changed_box::ChangedBox;
 use super::changes::Changes;
 use super::choice;
-use super::estimate::{Estimate, Range, cone_to_sphere, direction_in_cone};
 use crate::bounds::Bounds;
 use crate::chunks::in_chunks;
 use crate::coverage::{CoveredTexels, Texel, TexelGroups, receiver};
@@ -55,7 +55,7 @@ pub(super) struct IndirectChange<'a> {
 
 /// The light that leaves the patches in the new scene, and the change of their irradiance by bounces.
 #[derive(Clone, Copy)]
-struct PatchLight<'a> {
+struct PatchChange<'a> {
     patches: &'a Patches,
     /// Without emission, W/m².
     exitance: &'a [Vec3],
@@ -104,14 +104,14 @@ impl<'a> IndirectChange<'a> {
             return Ok((choice::keep_all(self.changes), StageNotes::default()));
         }
         let unknown = self.unknown_backs(&exchange.patches);
-        let light = PatchLight {
+        let light = PatchChange {
             patches: &exchange.patches,
             exitance: &exchange.exitance,
             change: &[],
             unknown: &unknown,
         };
         let of_patches = self.of_patches(light, factors, options, monitor)?;
-        let light = PatchLight { change: &of_patches, ..light };
+        let light = PatchChange { change: &of_patches, ..light };
         let of_texels = self.of_texels(light, options, monitor)?;
         let reused = choice::choose(self.changes, &self.texels.list, &of_texels, local, options.error);
         let origins = of_patches.len() + self.blocks.members.len();
@@ -122,7 +122,7 @@ impl<'a> IndirectChange<'a> {
     /// are not negative, so that bounds of S give bounds of Δ.
     fn of_patches(
         &self,
-        light: PatchLight<'_>,
+        light: PatchChange<'_>,
         factors: &FormFactors,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
@@ -187,7 +187,7 @@ impl<'a> IndirectChange<'a> {
     /// channels. It is estimated for blocks of texels, and infinite in and next to changed boxes.
     fn of_texels(
         &self,
-        light: PatchLight<'_>,
+        light: PatchChange<'_>,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<f32>, BakeError> {
@@ -229,9 +229,9 @@ impl<'a> IndirectChange<'a> {
         &self,
         sequence: Sequence,
         point: &impl Fn(u32, f32, f32) -> Option<Receiver>,
-        light: PatchLight<'_>,
-    ) -> Estimate {
-        let mut estimate = Estimate::default();
+        light: PatchChange<'_>,
+    ) -> ChangeSums {
+        let mut sums = ChangeSums::default();
         // Running sums of the cones' solid angles over 2π.
         let mut ends = Vec::with_capacity(self.spheres.len());
         for ray in 0..RAYS {
@@ -257,7 +257,7 @@ impl<'a> IndirectChange<'a> {
             };
             let cosine = direction.dot(receiver.geometric_normal);
             if cosine <= 0.0 {
-                estimate.add([Vec3::ZERO; 2], 0.0);
+                sums.add([Vec3::ZERO; 2], 0.0);
                 continue;
             }
             // Probability densities of both strategies. Cones may overlap.
@@ -268,18 +268,18 @@ impl<'a> IndirectChange<'a> {
             let cone_density = if total > 0.0 { containing as f32 / (TAU * total) } else { cosine_density };
             let weight = cosine_density / (0.5 * cosine_density + 0.5 * cone_density);
             match self.change_along(receiver.origin, direction, light) {
-                Some(range) => estimate.add(range, weight),
+                Some(range) => sums.add(range, weight),
                 None => {
-                    estimate.add([Vec3::ZERO; 2], 0.0);
-                    estimate.unknown = true;
+                    sums.add([Vec3::ZERO; 2], 0.0);
+                    sums.unknown = true;
                 }
             }
         }
-        estimate
+        sums
     }
 
     /// The change of the light that arrives along a ray, as radiance times π. `None` if it is not known.
-    fn change_along(&self, origin: Vec3, direction: Vec3, light: PatchLight<'_>) -> Option<Range> {
+    fn change_along(&self, origin: Vec3, direction: Vec3, light: PatchChange<'_>) -> Option<Range> {
         let is_new =
             |triangle: u32| self.changes.changed[self.scene.triangles[triangle as usize].map.place()];
         let is_black = |hit| matches!(hit, SurfaceHit::Back | SurfaceHit::Inside);
@@ -347,7 +347,7 @@ impl<'a> IndirectChange<'a> {
         triangle: u32,
         side: Side,
         at: (f32, f32),
-        light: PatchLight<'_>,
+        light: PatchChange<'_>,
     ) -> Option<(Vec3, Range)> {
         let Some(patch) = light.patches.at(triangle, side, at) else {
             return Some((Vec3::ZERO, [Vec3::ZERO; 2]));

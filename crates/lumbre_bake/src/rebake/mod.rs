@@ -20,11 +20,11 @@
 //! kept is added to the stated error, as its `reuse_error`.
 
 mod around_bake;
+mod change_sums;
 mod changed_box;
 mod changes;
 mod choice;
 mod direct_light_invalidation;
-mod estimate;
 mod fingerprints;
 mod indirect_change;
 mod samples;
