@@ -37,9 +37,8 @@ pub(crate) fn filled_maps(
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<FilledMaps, BakeError> {
     monitor.advance(0.2)?;
-    let light_and_errors = (lit.light, lit.indirect.variances.cautious.as_slice());
-    let (irradiance, variances) =
-        monitor.run_interruptible(0.2, || fill(lit.texels, light_and_errors, gap))?;
+    let (irradiance, variances) = monitor
+        .run_interruptible(0.2, || fill(lit.texels, lit.light, &lit.indirect.variances.cautious, gap))?;
     monitor.advance(1.0)?;
     Ok(FilledMaps { irradiance, variances })
 }
@@ -63,9 +62,8 @@ pub(crate) fn finished_maps(
         monitor.run_interruptible(0.9, || compare(texels, &irradiance, &variances, points))?;
     let pages =
         monitor.run_interruptible(0.9, || Pages::new(texels.layout, options.atlas_size, options.gap))?;
-    let separate = monitor.run_interruptible(1.0, || {
-        options.separate_light.then(|| separate(texels, (lit.direct, lit.indirect), &irradiance, options.gap))
-    })?;
+    let separate = monitor
+        .run_interruptible(1.0, || options.separate_light.then(|| separate(lit, &irradiance, options.gap)))?;
     let filled = FilledTexels { irradiance: &irradiance, variances: &variances, separate: separate.as_ref() };
     let (objects, maps) =
         monitor.run_interruptible(1.0, || baked_objects(objects, texels.layout, &filled, &pages))?;

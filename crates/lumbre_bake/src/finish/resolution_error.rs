@@ -13,7 +13,7 @@ use crate::denoise::REPLICATES;
 use crate::final_gather::{GatherSums, RadianceCache};
 use crate::monitor::{BakeMonitor, Clock};
 use crate::report::{ResolutionReport, StageNotes};
-use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
+use crate::sampling::{Sequence, Stream, cosine_about, hash, interval_at, triangle_point};
 use crate::scene::{Receiver, SurfaceHit};
 use crate::sources::Sources;
 use crate::texel_index::{MapIndex, MapTexel};
@@ -102,7 +102,9 @@ impl PointBaker<'_> {
         let points = in_chunks(count, monitor, |index| {
             let [choice, u, v, _] = sequence.point(index as u32, 0);
             let place = f64::from(choice) * area;
-            let triangle = ends.partition_point(|&end| end <= place).min(ends.len().saturating_sub(1));
+            let Some((triangle, ..)) = interval_at(&ends, |&end| end, place) else {
+                return DensePoint::default();
+            };
             self.bake_point(triangle as u32, triangle_point(u, v), index as u32, options.seed)
         })?;
         Ok(points)
@@ -201,18 +203,13 @@ fn look_up(
 ) -> Option<(Vec3, f32)> {
     let triangle = &texels.scene.triangles[point.triangle as usize];
     let map = &texels.layout.maps[triangle.map.place()];
-    let at = triangle.place_on_map(point.at) - 0.5;
+    let at = triangle.place_on_map(point.at);
     if !at.is_finite() {
         return None;
     }
-    let low = at.floor();
-    let fraction = at - low;
     let (mut light, mut variance) = (Vec3::ZERO, 0.0);
-    for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-        let weight = (1.0 - (fraction.x - dx).abs()) * (1.0 - (fraction.y - dy).abs());
-        let x = (low.x + dx).clamp(0.0, (map.width - 1) as f32) as u32;
-        let y = (low.y + dy).clamp(0.0, (map.height - 1) as f32) as u32;
-        let texel = map.texel(x, y).place();
+    for (texel, weight) in map.bilinear(at) {
+        let texel = texel.place();
         // Texels of which nothing is known are black in the map.
         light += weight * if filled[texel].is_finite() { filled[texel] } else { Vec3::ZERO };
         variance += weight * weight * if variances[texel].is_finite() { variances[texel] } else { 0.0 };

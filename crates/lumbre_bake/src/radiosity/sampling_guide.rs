@@ -15,6 +15,7 @@ use super::patch_index::{PatchIndex, RegionIndex};
 use super::patches::Patches;
 use super::sparse_distributions::{Entry, RowPart, SparseDistributions, cumulative};
 use super::unseen_regions::UnseenRegions;
+use crate::sampling::interval_at;
 use crate::scene::BakeScene;
 
 /// For each region, the regions that light it by bounces, with probabilities in proportion to the irradiance that they
@@ -259,9 +260,8 @@ impl SamplingGuide {
         let range =
             self.first_members[region as usize] as usize..self.first_members[region as usize + 1] as usize;
         let members = &self.members[range];
-        let place = members.partition_point(|member| member.end <= u);
-        let &Member { patch, end } = members.get(place)?;
-        let start = if place == 0 { 0.0 } else { members[place - 1].end };
+        let (place, start, end) = interval_at(members, |member| member.end, u)?;
+        let patch = members[place].patch;
         let u = ((u - start) / (end - start)).clamp(0.0, 1.0 - f32::EPSILON);
         Some(GuidedPatch { patch, u, density: probability * self.patches[patch.place()].density })
     }

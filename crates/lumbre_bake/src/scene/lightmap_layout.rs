@@ -4,6 +4,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use glam::Vec2;
 use lumbre_mesh::TriangleMesh;
 
 use super::SceneTriangle;
@@ -33,6 +34,21 @@ impl MapLayout {
     /// The places of its texels in lists per texel of all maps.
     pub fn places(&self) -> Range<usize> {
         self.first..self.first + (self.width * self.height) as usize
+    }
+
+    /// The four texels that bilinear filtering reads at a place of the map, in texels, and their weights, row by row.
+    /// Beyond the border, the texel at the border is read.
+    pub fn bilinear(&self, place: Vec2) -> [(MapTexel, f32); 4] {
+        let at = place - 0.5;
+        let low = at.floor();
+        let fraction = at - low;
+        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].map(|step| {
+            let step = Vec2::from(step);
+            let share = (Vec2::ONE - step) * (Vec2::ONE - fraction) + step * fraction;
+            // `as` saturates at 0.
+            let (x, y) = ((low.x + step.x) as u32, (low.y + step.y) as u32);
+            (self.texel(x.min(self.width - 1), y.min(self.height - 1)), share.x * share.y)
+        })
     }
 
     /// The columns and rows at most `radius` away from those of a texel, its own included, row by row.

@@ -148,18 +148,9 @@ impl Sampling<'_> {
         let triangle = &self.texels.scene.triangles[edge.triangle as usize];
         let map = &self.texels.layout.maps[triangle.map.place()];
         let chart = self.texels.charts[edge.triangle as usize];
-        let at = uv - 0.5;
-        let low = at.floor();
-        let fraction = at - low;
         let mut reading = Reading::default();
         let mut sum = 0.0;
-        for corner in 0..4 {
-            let step = Vec2::new((corner % 2) as f32, (corner / 2) as f32);
-            let share = (Vec2::ONE - step) * (Vec2::ONE - fraction) + step * fraction;
-            let weight = share.x * share.y;
-            // `as` saturates at 0: with the `min` below, coordinates are clamped to the border as a sampler does.
-            let (x, y) = ((low.x + step.x) as u32, (low.y + step.y) as u32);
-            let texel = map.texel(x.min(map.width - 1), y.min(map.height - 1));
+        for (corner, (texel, weight)) in map.bilinear(uv).into_iter().enumerate() {
             reading.texels[corner] = texel;
             if weight < NEGLIGIBLE {
                 continue;
