@@ -8,7 +8,7 @@ use std::collections::BinaryHeap;
 
 use super::emitter_bounds::BoundsLanes;
 use super::light_sources::Sources;
-use super::source_tree::clamp_below_one;
+use super::source_tree::{clamp_below_one, pick};
 use crate::sampling::interval_at;
 use crate::scene::Receiver;
 
@@ -60,25 +60,17 @@ impl Sources<'_> {
         u: f32,
     ) -> Option<(Branch, f32, f32)> {
         if shared.near {
-            let last = shared.branches.len().checked_sub(1)?;
             let mut weights = [0.0f32; MAX_NEAR_BRANCHES];
             shared.bounds.weights(receiver, &mut weights);
             for (weight, (branch, _)) in weights.iter_mut().zip(&shared.branches).skip(shared.bounds.len()) {
                 *weight = self.weight(*branch, receiver, 0.0);
             }
-            let sum = weights[..shared.branches.len()].iter().sum::<f32>();
-            let target = u * sum;
-            let mut running = 0.0;
-            for (weight, (branch, _)) in weights.iter().zip(&shared.branches) {
-                if target < running + weight {
-                    let u = clamp_below_one((target - running) / weight);
-                    return Some((*branch, u, weight / sum));
-                }
-                running += weight;
+            let weights = &weights[..shared.branches.len()];
+            if weights.iter().all(|weight| *weight == 0.0) {
+                return None;
             }
-            // Rounding put `target` beyond the end of the sums, or all weights are 0.
-            let (branch, weight) = (shared.branches[last].0, weights[last.min(MAX_NEAR_BRANCHES - 1)]);
-            return (weight > 0.0).then(|| (branch, 1.0 - f32::EPSILON, weight / sum));
+            let (place, probability, u) = pick(weights, u);
+            return Some((shared.branches[place].0, u, probability));
         }
         let (place, start, end) = interval_at(&shared.branches, |(_, end)| *end, u)?;
         let probability = (end - start).max(f32::MIN_POSITIVE);

@@ -13,6 +13,7 @@ use super::light_tree::{LightTree, has_position};
 use crate::scene::{BakeScene, PlacedLight};
 
 /// The sources of a scene.
+#[derive(Clone)]
 pub(crate) struct Sources<'a> {
     pub scene: &'a BakeScene,
     pub emitters: Arc<[Emitter]>,
@@ -60,16 +61,9 @@ impl<'a> Sources<'a> {
         if kept.len() < self.emitters.len() {
             return Self::new(self.scene, kept, Vec::new(), Vec3::ZERO);
         }
-        Self {
-            scene: self.scene,
-            emitters: Arc::clone(&self.emitters),
-            lamps: Arc::clone(&self.lamps),
-            emitter_tree: Arc::clone(&self.emitter_tree),
-            lights: Vec::new(),
-            light_tree: LightTree::default(),
-            individually_sampled_lights: Vec::new(),
-            sky: Vec3::ZERO,
-        }
+        let (lights, individually_sampled_lights) = (Vec::new(), Vec::new());
+        let light_tree = LightTree::default();
+        Self { lights, light_tree, individually_sampled_lights, sky: Vec3::ZERO, ..self.clone() }
     }
 
     /// Whether there is no light source.
