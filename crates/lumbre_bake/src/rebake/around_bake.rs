@@ -37,8 +37,6 @@ pub(crate) struct Rebake<'a> {
     keeps_samples: bool,
     /// Hash of everything that the bits of this bake follow from, former bakes included.
     pub identity: ContentHash,
-    /// `None` before it is needed.
-    prints: Option<ObjectPrints>,
     /// What differs from the former bake; `None` before it is known, or without a former bake.
     changes: Option<Changes<'a>>,
     /// The light by bounces that is kept; `None` before it is known, or without a former bake.
@@ -78,20 +76,8 @@ impl<'a> Rebake<'a> {
         };
         let identity = if is_limited { identity.made_from(&hashes.sampling) } else { identity };
         let report = refusal.map(|whole| RebakeReport { whole, ..RebakeReport::default() });
-        let (prints, changes, reused, samples) = (None, None, None, None);
-        Ok(Self {
-            input,
-            options,
-            hashes,
-            former,
-            keeps_samples,
-            identity,
-            prints,
-            changes,
-            reused,
-            report,
-            samples,
-        })
+        let (changes, reused, samples) = (None, None, None);
+        Ok(Self { input, options, hashes, former, keeps_samples, identity, changes, reused, report, samples })
     }
 
     /// Space and density of the former bake, so that texels stay where they were; without one, the scene's own space and
@@ -115,11 +101,10 @@ impl<'a> Rebake<'a> {
     ) -> Result<Vec<Option<Direct>>, BakeError> {
         let Some(former) = self.former else { return Ok(Vec::new()) };
         let (objects, hashes) = (&self.input.objects, &self.hashes);
-        let (prints, changes, known) = monitor.run_interruptible(1.0, || {
-            let prints = ObjectPrints::new(sources, texels);
-            let changes = Changes::find(former, hashes, objects, &prints, sources, texels);
+        let (changes, known) = monitor.run_interruptible(1.0, || {
+            let changes = Changes::find(former, hashes, objects, sources, texels);
             let known = changes.known_direct_light(texels);
-            (prints, changes, known)
+            (changes, known)
         })?;
         self.report = Some(RebakeReport {
             changed: changes.names.clone(),
@@ -127,7 +112,7 @@ impl<'a> Rebake<'a> {
             relit: texels.open().filter(|(texel, _)| known[texel.place()].is_none()).count(),
             ..RebakeReport::default()
         });
-        (self.prints, self.changes) = (Some(prints), Some(changes));
+        self.changes = Some(changes);
         Ok(known)
     }
 
@@ -168,11 +153,7 @@ impl<'a> Rebake<'a> {
         }
         // Samples that were cut short would not be good enough for a later bake that has more time.
         if self.keeps_samples && report.ended != Ended::Time {
-            let prints = self.prints.take();
-            let samples = monitor.run_interruptible(0.0, || {
-                let prints = prints.unwrap_or_else(|| ObjectPrints::new(sources, lit.texels));
-                self.samples_of(lit, sources, &prints, exchange)
-            })?;
+            let samples = monitor.run_interruptible(0.0, || self.samples_of(lit, sources, exchange))?;
             self.samples = Some(samples);
         }
         Ok(())
@@ -185,14 +166,16 @@ impl<'a> Rebake<'a> {
         self.samples
     }
 
-    fn samples_of(
-        &self,
-        lit: &LitTexels<'_>,
-        sources: &Sources<'_>,
-        prints: &ObjectPrints,
-        exchange: Option<&Exchange>,
-    ) -> Samples {
+    fn samples_of(&self, lit: &LitTexels<'_>, sources: &Sources<'_>, exchange: Option<&Exchange>) -> Samples {
         let LitTexels { texels, .. } = lit;
+        let new_prints;
+        let prints = match &self.changes {
+            Some(changes) => &changes.prints,
+            None => {
+                new_prints = ObjectPrints::new(sources, texels);
+                &new_prints
+            }
+        };
         let exitance = exchange
             .map(|exchange| exchange.exitance_of(texels.scene, texels.layout.maps.len()))
             .unwrap_or_default();

@@ -77,6 +77,8 @@ fn count_missing<'h>(
 /// What differs from the former bake, and what the former bake knows of everything else.
 pub(crate) struct Changes<'a> {
     pub former: &'a Content,
+    /// Of the new scene.
+    pub prints: ObjectPrints,
     /// Whether nothing differs, so that everything is kept as it is.
     pub nothing_changed: bool,
     /// Per object, whether it is new or has changed.
@@ -101,10 +103,10 @@ impl<'a> Changes<'a> {
         former: &'a Content,
         hashes: &Hashes,
         objects: &[SceneObject],
-        prints: &ObjectPrints,
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
     ) -> Self {
+        let prints = ObjectPrints::new(sources, texels);
         let mut by_hash: HashMap<ContentHash, Vec<&'a ObjectSamples>> = HashMap::new();
         // Lists are in reverse order, so that of several equal objects the first is popped first.
         for object in former.objects.iter().rev() {
@@ -142,6 +144,7 @@ impl<'a> Changes<'a> {
         let shadow_volumes = ShadowVolumes::new(sources, &boxes);
         Self {
             former,
+            prints,
             nothing_changed,
             changed,
             boxes,
