@@ -15,10 +15,10 @@ use crate::direct_light::{DirectLight, SHORT_OF_TIME, direct_light};
 use crate::final_gather::rounds;
 use crate::final_gather::{GatherReport, IndirectLight, LitTexels, RadianceCache};
 use crate::finish::finished_maps::{filled_maps, finished_maps};
-use crate::finish::resolution_error::{self, DensePoint};
+use crate::finish::resolution_error::{self, dense_points};
 use crate::memory;
 use crate::monitor::{BakeMonitor, Callback};
-use crate::probes::{self, PlacedVolume};
+use crate::probes;
 use crate::radiosity::patch_light::patch_light;
 use crate::radiosity::{Exchange, ExchangeReport, PatchResolution, Transport};
 use crate::rebake::{Rebake, Samples};
@@ -193,8 +193,8 @@ struct Request<'a> {
     keeps_samples: bool,
 }
 
-/// A bake with what stands around its stages: the former bake, the checkpoint and the clock. Also returns the samples for
-/// the next bake, if they are requested.
+/// A bake with what stands around its stages: the former bake, the checkpoint and the clock. Also returns the samples
+/// for the next bake, if they are requested.
 fn around_stages(
     input: &Arc<StaticScene>,
     request: &Request<'_>,
@@ -213,47 +213,59 @@ fn around_stages(
     Ok((baked, samples))
 }
 
-/// Runs the stages in order. Each takes values that earlier stages have returned, and its notes go into the report.
-/// Two of them skip what `rebake` knows already, which is nothing without a former bake.
+/// Runs the stages in order. Each takes values that earlier stages have returned, and its notes are collected for the
+/// report. Two of them skip what `rebake` knows already, which is nothing without a former bake.
 fn run(
     input: &Arc<StaticScene>,
     rebake: &mut Rebake<'_>,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<BakedScene, BakeError> {
-    let mut report = BakeReport::default();
+    let mut notes = StageNotes::default();
     if input.objects.is_empty() {
-        return Ok(BakedScene::dark("the scene has no static mesh", report));
+        return Ok(BakedScene::dark("the scene has no static mesh", 0, notes));
     }
     let plan = rebake.plan();
-    let layout = report.noted(prepare::layout(input, &plan, options, monitor)?);
+    let layout = notes.noted(prepare::layout(input, &plan, options, monitor)?);
 
     monitor.stage(Stage::Hierarchy)?;
-    let (scene, layout, emitters) = report.noted(prepare::scene(input, layout, plan.space, monitor)?);
-    report.triangles = scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate).count();
-    let sources = report.noted(prepare::sources(input, &scene, emitters, monitor)?);
+    let (scene, layout, emitters) = notes.noted(prepare::scene(input, layout, plan.space, monitor)?);
+    let triangles = scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate).count();
+    let sources = notes.noted(prepare::sources(input, &scene, emitters, monitor)?);
     if sources.is_empty() {
         let why = "no surface emits, no light is static or mixed, and there is no sky";
-        return Ok(BakedScene::dark(why, report));
+        return Ok(BakedScene::dark(why, triangles, notes));
     }
     memory::check_texels(&scene, &layout, plan.sample_bytes, options)?;
 
     monitor.stage(Stage::DirectLight)?;
-    let texels = report.noted(CoveredTexels::new(&scene, &layout, monitor)?);
-    let patch_resolution = report.noted(patch_resolution(&texels, plan.sample_bytes, options, monitor)?);
+    let texels = notes.noted(CoveredTexels::new(&scene, &layout, monitor)?);
+    let patch_resolution = notes.noted(patch_resolution(&texels, plan.sample_bytes, options, monitor)?);
     let known = rebake.known_direct_light(&sources, &texels, monitor)?;
-    let direct = report.noted(direct_light(&sources, &texels, &known, options, monitor)?);
+    let direct = notes.noted(direct_light(&sources, &texels, &known, options, monitor)?);
 
     let bounces = bounces(&sources, &texels, &direct, &patch_resolution, rebake, options, monitor)?;
-    let Bounces { indirect, cache, exchanged, gathered } = report.noted(bounces);
-    let volume = report.noted(volume(input, &sources, cache.as_ref(), options, monitor)?);
-    let points = report.noted(points(&sources, cache.as_ref(), report.rays, options, monitor)?);
+    let Bounces { indirect, cache, exchanged, gathered } = notes.noted(bounces);
+    let volume = match probes::emitters_of_probes(input, &sources, cache.is_some(), options) {
+        Err(why) => notes.without("probes", why),
+        Ok(emitters) => {
+            monitor.stage(Stage::Probes)?;
+            Some(notes.noted(probes::bake(input, &emitters, cache.as_ref(), options, monitor)?))
+        }
+    };
+    let points = match resolution_error::why_left_out(options, monitor.clock()) {
+        Some(why) => notes.without("resolution error", why),
+        None => {
+            monitor.stage(Stage::Resolution)?;
+            notes.noted(dense_points(&sources, cache.as_ref(), notes.rays, options, monitor)?)
+        }
+    };
 
     monitor.stage(Stage::Texels)?;
     let light = indirect.with(&direct);
     let lit = LitTexels { texels: &texels, direct: &direct, indirect: &indirect, light: &light };
-    let (volume_figures, patch_resolution) = (volume.as_ref(), &patch_resolution);
-    let figures = LightFigures { patch_resolution, exchanged, gathered, volume: volume_figures };
+    let figures = LightFigures { patch_resolution, exchanged, gathered, volume: volume.as_ref() };
+    let mut report = BakeReport { triangles, ..BakeReport::default() };
     summary::write_light(&lit, figures, &input.objects, options, monitor, &mut report)?;
     rebake.record(&lit, &sources, cache.as_ref().map(|cache| &cache.exchange), &report, monitor)?;
     let filled = filled_maps(&lit, options.gap, monitor)?;
@@ -261,14 +273,14 @@ fn run(
     monitor.stage(Stage::Seams)?;
     let mean = report.mean_of_channels();
     let finished = finished_maps(&lit, filled, &points, mean, &input.objects, options, monitor)?;
-    let finished = report.noted(finished);
-    summary::write_maps(&finished, &mut report);
+    let finished = notes.noted(finished);
+    summary::write_maps(&finished, notes, &mut report);
     let volume = volume.map(|placed| (placed.grid.transform(plan.space), placed.volume));
     Ok(BakedScene { objects: finished.objects, maps: finished.maps, volume, report })
 }
 
-/// How finely light is exchanged: as the quality and the memory allow, and coarser if time is short, so that most of it is
-/// left for the final gather.
+/// How finely light is exchanged: as the quality and the memory allow, and coarser if time is short, so that most of it
+/// is left for the final gather.
 fn patch_resolution(
     texels: &CoveredTexels<'_>,
     sample_bytes: u64,
@@ -283,8 +295,8 @@ fn patch_resolution(
 /// The light by bounces of all covered texels.
 struct Bounces<'a> {
     indirect: IndirectLight,
-    /// The light that leaves surfaces, for rays of later stages; `None` where nothing bounces, as are the figures of the
-    /// gather.
+    /// The light that leaves surfaces, for rays of later stages; `None` where nothing bounces, as are the figures of
+    /// the gather.
     cache: Option<RadianceCache<'a>>,
     exchanged: ExchangeReport,
     gathered: Option<GatherReport>,
@@ -326,37 +338,4 @@ fn bounces<'a>(
     let gathered = rounds::gather(&mut cache, texels, direct, reused, options, monitor)?;
     let (indirect, gathered) = notes.noted(gathered);
     Ok((Bounces { indirect, cache: Some(cache), exchanged, gathered: Some(gathered) }, notes))
-}
-
-/// The irradiance probes; `None` where they are not wanted, or would be dark.
-fn volume(
-    input: &StaticScene,
-    sources: &Sources<'_>,
-    cache: Option<&RadianceCache<'_>>,
-    options: &BakeOptions,
-    monitor: &mut BakeMonitor<'_>,
-) -> Result<(Option<PlacedVolume>, StageNotes), BakeError> {
-    let emitters = match probes::emitters_of_probes(input, sources, cache.is_some(), options) {
-        Ok(emitters) => emitters,
-        Err(why) => return Ok((None, StageNotes::of_skipped(format!("probes: {why}")))),
-    };
-    monitor.stage(Stage::Probes)?;
-    let (volume, notes) = probes::bake(input, &emitters, cache, options, monitor)?;
-    Ok((Some(volume), notes))
-}
-
-/// The points at which the finished maps' resolution is measured; none where it is not. `rays` is how many rays the bake
-/// has cast so far.
-fn points(
-    sources: &Sources<'_>,
-    cache: Option<&RadianceCache<'_>>,
-    rays: u64,
-    options: &BakeOptions,
-    monitor: &mut BakeMonitor<'_>,
-) -> Result<(Vec<DensePoint>, StageNotes), BakeError> {
-    if let Some(why) = resolution_error::why_left_out(options, monitor.clock()) {
-        return Ok((Vec::new(), StageNotes::of_skipped(format!("resolution error: {why}"))));
-    }
-    monitor.stage(Stage::Resolution)?;
-    resolution_error::dense_points(sources, cache, rays, options, monitor)
 }

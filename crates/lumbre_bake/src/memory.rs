@@ -36,8 +36,8 @@ const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + 7 * 4) as u64;
 
 /// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later:
-/// estimates with their bias, the numbers of the weighted fit, features with the noise, products, and nearness. Besides,
-/// its place among the covered texels and its surface, and what rays that hit it read.
+/// estimates with their bias, the numbers of the weighted fit, features with the noise, products, and nearness.
+/// Besides, its place among the covered texels and its surface, and what rays that hit it read.
 const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 3) + 8 + size_of::<TexelRadiance>() as u64;
 
 /// Per texel of a map, for separate maps of direct and bounced light: both as computed, as filled, and as divided.

@@ -241,8 +241,9 @@ pub(crate) fn triangle_point(u: f32, v: f32) -> (f32, f32) {
     }
 }
 
-/// Finds the interval of a cumulative distribution that contains `u`: its place, its begin and its end. `end` is where an
-/// item's interval ends and the next item's begins; from the last end on, the last interval counts. `None` without items.
+/// Finds the interval of a cumulative distribution that contains `u`: its place, its begin and its end. `end` is where
+/// an item's interval ends and the next item's begins; from the last end on, the last interval counts. `None` without
+/// items.
 pub(crate) fn interval_at<T, N: Copy + PartialOrd + Default>(
     items: &[T],
     end: impl Fn(&T) -> N,

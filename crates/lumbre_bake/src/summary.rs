@@ -10,6 +10,7 @@ use crate::finish::worst_places::worst_places;
 use crate::monitor::BakeMonitor;
 use crate::probes::PlacedVolume;
 use crate::radiosity::{ExchangeReport, PatchResolution};
+use crate::report::StageNotes;
 use crate::scene::SceneObject;
 use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime, ProbeReport};
 
@@ -33,7 +34,7 @@ pub(crate) fn finish(report: &mut BakeReport, monitor: &mut BakeMonitor<'_>) {
 
 /// The figures of the stages that compute the light.
 pub(crate) struct LightFigures<'a> {
-    pub patch_resolution: &'a PatchResolution,
+    pub patch_resolution: PatchResolution,
     pub exchanged: ExchangeReport,
     /// `None` where nothing bounces.
     pub gathered: Option<GatherReport>,
@@ -85,8 +86,9 @@ pub(crate) fn write_light(
     Ok(())
 }
 
-/// Writes the figures of the finished maps.
-pub(crate) fn write_maps(finished: &FinishedMaps, report: &mut BakeReport) {
+/// Writes the figures of the finished maps, and the notes of all stages.
+pub(crate) fn write_maps(finished: &FinishedMaps, notes: StageNotes, report: &mut BakeReport) {
+    report.set_notes(notes);
     report.maps = finished.maps.len();
     report.atlases = finished.atlases;
     report.seams = finished.seams;

@@ -1,5 +1,5 @@
-//! The indices of a texel, as types that cannot be confused: its index among the texels of all maps, its index among the
-//! covered texels, which show a surface, and the index of its map.
+//! The indices of a texel, as types that cannot be confused: its index among the texels of all maps, its index among
+//! the covered texels, which show a surface, and the index of its map.
 
 /// The index of a texel among those of all maps, map by map and row by row. Lists "per texel of all maps" are in this
 /// order.
@@ -10,8 +10,8 @@ pub(crate) struct MapTexel(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct CoveredTexel(pub u32);
 
-/// The index of a map of the layout, which is also that of the object that the map belongs to. Objects share images only
-/// in finished maps (`finish::pages`).
+/// The index of a map of the layout, which is also that of the object that the map belongs to. Objects share images
+/// only in finished maps (`finish::pages`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct MapIndex(pub u32);
 

@@ -89,8 +89,8 @@ impl RadianceCache<'_> {
         self.reflectance_at(triangle, side, at) * irradiance
     }
 
-    /// The direct irradiance (mixed lights included) at a point of a front, W/m², and the rays that it took: where that of
-    /// the texel is steep.
+    /// The direct irradiance (mixed lights included) at a point of a front, W/m², and the rays that it took: where that
+    /// of the texel is steep.
     pub(crate) fn direct_light_at(&self, triangle: u32, at: (f32, f32), sequence: Sequence) -> (Vec3, u32) {
         let point = FootprintPoint { triangle, at, offset: Vec2::ZERO };
         let receiver = receiver(self.scene, &point);

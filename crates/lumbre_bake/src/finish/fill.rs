@@ -191,8 +191,8 @@ impl PlaneFit {
         }
     }
 
-    /// The value at the centre, clamped to the range of the texels and a little more, and its squared error; those of the
-    /// nearest texel if they are not finite. `None` if no texel is known.
+    /// The value at the centre, clamped to the range of the texels and a little more, and its squared error; those of
+    /// the nearest texel if they are not finite. `None` if no texel is known.
     fn at_center(&self) -> Option<(Vec3, f32)> {
         if self.nearest.0 == f32::INFINITY {
             return None;
@@ -208,8 +208,8 @@ impl PlaneFit {
         let [mean, with_x, with_y] = self.sums.map(|sum| sum / self.moments[0]);
         let value =
             (mean + (with_x - mean * sx) * to_center.x + (with_y - mean * sy) * to_center.y).as_vec3();
-        // The nearest texels alone give the range, if there are any: a shadow's edge two texels away must not reach this
-        // one.
+        // The nearest texels alone give the range, if there are any: a shadow's edge two texels away must not reach
+        // this one.
         let [near, far] = self.ranges;
         let Bounds { low, high } = if near.low.x <= near.high.x { near } else { far };
         let margin = (high - low) * 0.5;

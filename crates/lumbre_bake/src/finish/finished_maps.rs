@@ -43,7 +43,8 @@ pub(crate) fn filled_maps(
     Ok(FilledMaps { irradiance, variances })
 }
 
-/// Finishes filled maps. `mean` is their mean irradiance, mean of the channels; `points` are what the finished maps are compared with, to measure what their resolution costs.
+/// Finishes filled maps. `mean` is their mean irradiance, mean of the channels; `points` are what the finished maps are
+/// compared with, to measure what their resolution costs.
 pub(crate) fn finished_maps(
     lit: &LitTexels<'_>,
     filled: FilledMaps,

@@ -54,7 +54,8 @@ pub(crate) fn why_left_out(options: &BakeOptions, clock: Clock) -> Option<&'stat
     }
 }
 
-/// The points that the finished map is compared with. `cache` is `None` where nothing bounces; `rays` is how many rays the bake has cast so far.
+/// The points that the finished map is compared with. `cache` is `None` where nothing bounces; `rays` is how many rays
+/// the bake has cast so far.
 pub(crate) fn dense_points(
     sources: &Sources<'_>,
     cache: Option<&RadianceCache<'_>>,

@@ -58,8 +58,8 @@ type ExchangeResult = ((Option<(Exchange, FormFactors)>, ExchangeReport), StageN
 impl Exchange {
     /// Finds the light of all patches. Returns the form factors as well, by which `rebake` estimates what changes since
     /// a former bake do to the light. `None` where no light reaches a surface that reflects; the notes then say so.
-    /// `known_direct` is the direct irradiance of each patch by two independent halves of samples, or `None` for patches
-    /// of which it is not known: those cast shadow rays.
+    /// `known_direct` is the direct irradiance of each patch by two independent halves of samples, or `None` for
+    /// patches of which it is not known: those cast shadow rays.
     pub fn new(
         sources: &Sources<'_>,
         transport: Transport,

@@ -1,5 +1,5 @@
-//! Sparse discrete distributions, which are sampled by inversion: a table of rows, each with probabilities of a few of the
-//! columns. What rows and columns stand for is the matter of `sampling_guide`.
+//! Sparse discrete distributions, which are sampled by inversion: a table of rows, each with probabilities of a few of
+//! the columns. What rows and columns stand for is the matter of `sampling_guide`.
 
 /// Sparse discrete distributions over the same columns, one per row. They are too large for the near caches, so what is
 /// read together is stored together.
@@ -136,8 +136,8 @@ impl SparseDistributions {
         (self.entries.get(part.begin + at).filter(|_| at < part.count as usize), start)
     }
 
-    /// The column at `u`, given the `part` that [`near`](Self::near) returned; the place of `u` in the column's interval,
-    /// stretched to [0, 1); and the column's probability.
+    /// The column at `u`, given the `part` that [`near`](Self::near) returned; the place of `u` in the column's
+    /// interval, stretched to [0, 1); and the column's probability.
     pub fn pick(&self, part: &RowPart, u: f32) -> Option<(u32, f32, f32)> {
         let (entry, start) = self.find(part, |entry| entry.end <= u);
         let &Entry { column, end } = entry?;

@@ -80,8 +80,8 @@ impl<'a> Rebake<'a> {
         Ok(Self { input, options, hashes, former, keeps_samples, identity, changes, reused, report, samples })
     }
 
-    /// Space and density of the former bake, so that texels stay where they were; without one, the scene's own space and
-    /// what the options ask for.
+    /// Space and density of the former bake, so that texels stay where they were; without one, the scene's own space
+    /// and what the options ask for.
     pub fn plan(&self) -> BakePlan {
         let space = self.former.map_or_else(|| self.input.space(), |former| former.space);
         let new_density = || density_of(&self.input.objects, space, self.options);
@@ -91,8 +91,8 @@ impl<'a> Rebake<'a> {
         BakePlan { space, density, sample_bytes: kept + former }
     }
 
-    /// Compares the scene with that of the former bake. Returns the direct light of every covered texel that cannot have
-    /// changed; an empty list without a former bake.
+    /// Compares the scene with that of the former bake. Returns the direct light of every covered texel that cannot
+    /// have changed; an empty list without a former bake.
     pub fn known_direct_light(
         &mut self,
         sources: &Sources<'_>,

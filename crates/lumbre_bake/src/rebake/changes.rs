@@ -187,7 +187,8 @@ fn names(objects: &[SceneObject], changed: &[bool], gone: &[&ObjectSamples], lig
 }
 
 /// The former samples of every covered texel that still shows the same surface, and the former irradiance per texel of
-/// all maps. `first` holds each object's first triangle, `unchanged` the former samples of each object that has not changed.
+/// all maps. `first` holds each object's first triangle, `unchanged` the former samples of each object that has not
+/// changed.
 fn known<'a>(
     texels: &CoveredTexels<'_>,
     first: &[u32],

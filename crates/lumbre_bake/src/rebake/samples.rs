@@ -128,8 +128,8 @@ impl Weights {
 }
 
 impl TexelSamples {
-    /// The samples of a bake, by object. `first` holds each object's first triangle; `reuse_error` is per covered texel,
-    /// and empty if nothing was kept.
+    /// The samples of a bake, by object. `first` holds each object's first triangle; `reuse_error` is per covered
+    /// texel, and empty if nothing was kept.
     pub fn by_object(lit: &LitTexels<'_>, first: &[u32], reuse_error: &[f32]) -> Vec<Vec<Self>> {
         let LitTexels { texels, direct, indirect, .. } = lit;
         let mut by_object: Vec<Vec<Self>> = vec![Vec::new(); texels.layout.maps.len()];

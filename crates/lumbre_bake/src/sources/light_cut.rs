@@ -189,8 +189,8 @@ impl Sources<'_> {
         cut
     }
 
-    /// Opens the nodes of most estimated light below the roots while that is worth it. Returns what is left closed, in no
-    /// order, and the estimated light of all of them.
+    /// Opens the nodes of most estimated light below the roots while that is worth it. Returns what is left closed, in
+    /// no order, and the estimated light of all of them.
     fn opened(&self, roots: Vec<Branch>, receiver: &Receiver, reach: f32) -> (Vec<Weighted>, f32) {
         let weighted = |branch: Branch| Weighted { weight: self.weight(branch, receiver, reach), branch };
         let mut open: BinaryHeap<Weighted> = roots.into_iter().map(weighted).collect();
