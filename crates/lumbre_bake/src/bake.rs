@@ -10,24 +10,24 @@ use crate::apply::apply;
 use crate::baked_scene::BakedScene;
 use crate::checkpoint::CheckpointFile;
 use crate::chunks::decide;
-use crate::content_hash::hashes_of;
 use crate::coverage::CoveredTexels;
-use crate::direct_light::{SHORT_OF_TIME, direct_light};
+use crate::direct_light::{DirectLight, SHORT_OF_TIME, direct_light};
 use crate::final_gather::rounds;
-use crate::final_gather::{IndirectLight, LitTexels, RadianceCache};
-use crate::finish::FinishedMaps;
-use crate::finish::finished_maps::finished_maps;
-use crate::finish::resolution_error::dense_points;
+use crate::final_gather::{GatherReport, IndirectLight, LitTexels, RadianceCache};
+use crate::finish::finished_maps::{filled_maps, finished_maps};
+use crate::finish::resolution_error::{self, dense_points};
 use crate::memory;
 use crate::monitor::{BakeMonitor, Callback};
 use crate::probes;
 use crate::radiosity::patch_light::patch_light;
-use crate::radiosity::{Exchange, Patches};
-use crate::rebake::{Reuse, Samples, reused_gather};
+use crate::radiosity::{Exchange, ExchangeReport, PatchResolution, Transport};
+use crate::rebake::{Rebake, Samples};
+use crate::report::StageNotes;
 use crate::scene::{StaticScene, from_world};
+use crate::sources::Sources;
 use crate::stage::Stage;
-use crate::summary;
-use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, Progress, prepare};
+use crate::summary::{self, LightFigures};
+use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Progress, prepare};
 
 /// Configures and runs a bake, which computes the light on the static objects of a scene and stores it in lightmaps.
 ///
@@ -169,9 +169,7 @@ impl<'a> Bake<'a> {
         let mut bake = || {
             let monitor = BakeMonitor::new(&mut *self.progress, options.time);
             let mut monitor = monitor.cancelled_by(self.cancel.clone());
-            let (mut baked, samples) = run(scene, &self.request, &mut monitor)?;
-            summary::finish(&mut baked.report, &mut monitor);
-            Ok((baked, samples))
+            around_stages(scene, &self.request, &mut monitor)
         };
         let (baked, samples) = match options.threads {
             None => bake()?,
@@ -195,128 +193,149 @@ struct Request<'a> {
     keeps_samples: bool,
 }
 
-/// Runs the stages in order. Each takes values that earlier stages have returned, and its notes go into the report. Also
-/// returns the samples for the next bake, if they are requested.
-fn run(
+/// A bake with what stands around its stages: the former bake, the checkpoint and the clock. Also returns the samples
+/// for the next bake, if they are requested.
+fn around_stages(
     input: &Arc<StaticScene>,
     request: &Request<'_>,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(BakedScene, Option<Samples>), BakeError> {
-    let options = &request.options;
     monitor.stage(Stage::Layout)?;
-    let reuse = request.prepare_reuse(input, monitor)?;
-    let mut report = BakeReport {
-        content_hash: reuse.content_hash().to_string(),
-        threads: rayon::current_num_threads(),
-        rebake: reuse.refusal(),
-        ..BakeReport::default()
-    };
-    if input.objects.is_empty() {
-        return Ok((BakedScene::dark("the scene has no static mesh", report), None));
+    let mut rebake = Rebake::new(request.former, request.keeps_samples, input, &request.options, monitor)?;
+    if let Some(checkpoint) = request.checkpoint {
+        let opened = CheckpointFile::open(checkpoint, &rebake.identity);
+        monitor.checkpoint =
+            opened.map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })?;
     }
-    let (space, density) = (reuse.space(input), reuse.density(input, options));
-    let layout = report.noted(prepare::layout(input, space, density, options, monitor)?);
+    let mut baked = run(input, &mut rebake, &request.options, monitor)?;
+    let samples = rebake.finish(&mut baked.report);
+    summary::finish(&mut baked.report, monitor);
+    Ok((baked, samples))
+}
+
+/// Runs the stages in order. Each takes values that earlier stages have returned, and its notes are collected for the
+/// report. Two of them skip what `rebake` knows already, which is nothing without a former bake.
+fn run(
+    input: &Arc<StaticScene>,
+    rebake: &mut Rebake<'_>,
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<BakedScene, BakeError> {
+    let mut notes = StageNotes::default();
+    if input.objects.is_empty() {
+        return Ok(BakedScene::dark("the scene has no static mesh", 0, notes));
+    }
+    let plan = rebake.plan();
+    let layout = notes.noted(prepare::layout(input, &plan, options, monitor)?);
 
     monitor.stage(Stage::Hierarchy)?;
-    let (scene, layout, emitters) = report.noted(prepare::scene(input, layout, space, monitor)?);
-    report.triangles = scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate).count();
-    let sources = report.noted(prepare::sources(input, &scene, emitters, monitor)?);
+    let (scene, layout, emitters) = notes.noted(prepare::scene(input, layout, plan.space, monitor)?);
+    let triangles = scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate).count();
+    let sources = notes.noted(prepare::sources(input, &scene, emitters, monitor)?);
     if sources.is_empty() {
         let why = "no surface emits, no light is static or mixed, and there is no sky";
-        return Ok((BakedScene::dark(why, report), None));
+        return Ok(BakedScene::dark(why, triangles, notes));
     }
-    let sample_bytes = request.sample_bytes(reuse.is_possible());
-    memory::check_texels(&scene, &layout, sample_bytes, options)?;
+    memory::check_texels(&scene, &layout, plan.sample_bytes, options)?;
 
     monitor.stage(Stage::DirectLight)?;
-    let texels = report.noted(CoveredTexels::new(&scene, &layout, monitor)?);
-    let is_time_short = monitor.clock().is_past(SHORT_OF_TIME);
-    let patch_options = options.for_patches(decide(monitor, is_time_short)?);
-    let resolution = report.noted(
-        monitor.run_interruptible(1.0, || memory::resolution(&texels, sample_bytes, &patch_options))??,
-    );
-    let changes = monitor.run_interruptible(1.0, || reuse.changes(&input.objects, &sources, &texels))?;
-    let known = changes.as_ref().map_or(&[][..], |changes| &changes.known_direct);
-    let direct = report.noted(direct_light(&sources, &texels, known, options, monitor)?);
+    let texels = notes.noted(CoveredTexels::new(&scene, &layout, monitor)?);
+    let patch_resolution = notes.noted(patch_resolution(&texels, plan.sample_bytes, options, monitor)?);
+    let known = rebake.known_direct_light(&sources, &texels, monitor)?;
+    let direct = notes.noted(direct_light(&sources, &texels, &known, options, monitor)?);
 
-    let patch_light = |patches: &Patches| patch_light(&texels, &direct, patches);
-    let (exchange, exchanged) =
-        report.noted(Exchange::new(&sources, &patch_options, resolution, patch_light, monitor)?);
-    let reused = match (&exchange, &changes) {
-        (Some((exchange, factors)), Some(changes)) => {
-            let exchange = (exchange, factors);
-            let reused = reused_gather(changes, &sources, &texels, &direct, exchange, options, monitor)?;
-            Some(report.noted(reused))
-        }
-        _ => None,
-    };
-    let exchange = exchange.map(|(exchange, _)| exchange);
-    let (indirect, gathered, cache) = match &exchange {
-        None => (IndirectLight::none(&texels, &direct), None, None),
-        Some(exchange) => {
-            monitor.stage(Stage::FinalGather)?;
-            let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, monitor)?;
-            let (indirect, gathered) = report.noted(rounds::gather(
-                &mut cache,
-                &texels,
-                &direct,
-                reused.as_ref(),
-                options,
-                monitor,
-            )?);
-            (indirect, Some(gathered), Some(cache))
+    let bounces = bounces(&sources, &texels, &direct, &patch_resolution, rebake, options, monitor)?;
+    let Bounces { indirect, cache, exchanged, gathered } = notes.noted(bounces);
+    let volume = match probes::emitters_of_probes(input, &sources, cache.is_some(), options) {
+        Err(why) => notes.without("probes", why),
+        Ok(emitters) => {
+            monitor.stage(Stage::Probes)?;
+            Some(notes.noted(probes::bake(input, &emitters, cache.as_ref(), options, monitor)?))
         }
     };
-    let volume = report.noted(probes::bake(input, &scene, &sources, cache.as_ref(), options, monitor)?);
-    let points = report.noted(dense_points(&sources, cache.as_ref(), report.rays, options, monitor)?);
+    let points = match resolution_error::why_left_out(options, monitor.clock()) {
+        Some(why) => notes.without("resolution error", why),
+        None => {
+            monitor.stage(Stage::Resolution)?;
+            notes.noted(dense_points(&sources, cache.as_ref(), notes.rays, options, monitor)?)
+        }
+    };
 
     monitor.stage(Stage::Texels)?;
     let light = indirect.with(&direct);
     let lit = LitTexels { texels: &texels, direct: &direct, indirect: &indirect, light: &light };
-    summary::write_stages(&lit, &resolution, exchanged, volume.as_ref(), &mut report);
-    summary::write_errors(&lit, gathered, &input.objects, options, monitor, &mut report)?;
-    if let Some(changes) = &changes {
-        report.rebake = Some(changes.report(&texels, reused.as_ref(), report.mean_of_channels()));
-    }
-    let samples = match request.keeps_samples && report.ended != Ended::Time {
-        // Samples that were cut short would not be good enough for a later bake that has more time.
-        false => None,
-        true => Some(monitor.run_interruptible(0.0, || {
-            let exitance = exchange.as_ref().map(|exchange| exchange.exitance_of(&scene, layout.maps.len()));
-            reuse.samples(&lit, reused.as_ref(), &input.objects, &sources, &exitance.unwrap_or_default())
-        })?),
-    };
+    let figures = LightFigures { patch_resolution, exchanged, gathered, volume: volume.as_ref() };
+    let mut report = BakeReport { triangles, ..BakeReport::default() };
+    summary::write_light(&lit, figures, &input.objects, options, monitor, &mut report)?;
+    rebake.record(&lit, &sources, cache.as_ref().map(|cache| &cache.exchange), &report, monitor)?;
+    let filled = filled_maps(&lit, options.gap, monitor)?;
+
+    monitor.stage(Stage::Seams)?;
     let mean = report.mean_of_channels();
-    let finished = finished_maps(&lit, &points, mean, &input.objects, options, monitor)?;
-    let FinishedMaps { objects, maps, atlases, seams, resolution } = report.noted(finished);
-    report = BakeReport { maps: maps.len(), atlases, seams, resolution, ..report };
-    let volume = volume.map(|placed| (placed.grid.transform(space), placed.volume));
-    Ok((BakedScene { objects, maps, volume, report }, samples))
+    let finished = finished_maps(&lit, filled, &points, mean, &input.objects, options, monitor)?;
+    let finished = notes.noted(finished);
+    summary::write_maps(&finished, notes, &mut report);
+    let volume = volume.map(|placed| (placed.grid.transform(plan.space), placed.volume));
+    Ok(BakedScene { objects: finished.objects, maps: finished.maps, volume, report })
 }
 
-impl Request<'_> {
-    /// Hashes the scene, decides whether samples of a previous bake can be used, and opens the checkpoint.
-    fn prepare_reuse(
-        &self,
-        input: &StaticScene,
-        monitor: &mut BakeMonitor<'_>,
-    ) -> Result<Reuse<'_>, BakeError> {
-        let hashes = monitor.run_interruptible(0.0, || hashes_of(input, &self.options))?;
-        // Samples take memory. If that is limited, fewer patches may fit beside them, and the light would differ.
-        let limited = self.options.memory.is_some() && self.sample_bytes(self.former.is_some()) > 0;
-        let reuse = Reuse::new(self.former, hashes, limited, input, &self.options);
-        if let Some(checkpoint) = self.checkpoint {
-            let opened = CheckpointFile::open(checkpoint, &reuse.identity);
-            monitor.checkpoint =
-                opened.map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })?;
-        }
-        Ok(reuse)
-    }
+/// How finely light is exchanged: as the quality and the memory allow, and coarser if time is short, so that most of it
+/// is left for the final gather.
+fn patch_resolution(
+    texels: &CoveredTexels<'_>,
+    sample_bytes: u64,
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(PatchResolution, StageNotes), BakeError> {
+    let is_time_short = monitor.clock().is_past(SHORT_OF_TIME);
+    let options = options.for_patches(decide(monitor, is_time_short)?);
+    monitor.run_interruptible(1.0, || memory::patch_resolution(texels, sample_bytes, &options))?
+}
 
-    /// Bytes per covered texel for samples: those that this bake returns, and those of the previous bake if they are
-    /// used.
-    fn sample_bytes(&self, uses_former: bool) -> u64 {
-        let returned = if self.keeps_samples { memory::SAMPLES_BYTES } else { 0 };
-        returned + if uses_former { memory::FORMER_SAMPLES_BYTES } else { 0 }
-    }
+/// The light by bounces of all covered texels.
+struct Bounces<'a> {
+    indirect: IndirectLight,
+    /// The light that leaves surfaces, for rays of later stages; `None` where nothing bounces, as are the figures of
+    /// the gather.
+    cache: Option<RadianceCache<'a>>,
+    exchanged: ExchangeReport,
+    gathered: Option<GatherReport>,
+}
+
+/// Exchanges light between patches, and gathers it at the covered texels.
+fn bounces<'a>(
+    sources: &'a Sources<'a>,
+    texels: &CoveredTexels<'a>,
+    direct: &DirectLight,
+    resolution: &PatchResolution,
+    rebake: &mut Rebake<'_>,
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(Bounces<'a>, StageNotes), BakeError> {
+    let mut notes = StageNotes::default();
+    monitor.stage(Stage::FormFactors)?;
+    let transport = notes.noted(Transport::new(sources.scene, resolution, options, monitor)?);
+    let exchange = match transport.is_black() {
+        true => monitor.run_interruptible(0.5, || Exchange::black(sources, transport))?,
+        false => {
+            monitor.stage(Stage::Radiosity)?;
+            let known = monitor.run_interruptible(0.1, || patch_light(texels, direct, &transport.patches))?;
+            Exchange::new(sources, transport, &known, options, monitor)?
+        }
+    };
+    let (exchange, exchanged) = notes.noted(exchange);
+    let Some((exchange, factors)) = exchange else {
+        let indirect = IndirectLight::none(texels, direct);
+        return Ok((Bounces { indirect, cache: None, exchanged, gathered: None }, notes));
+    };
+    let reused = rebake.reused_gather(sources, texels, direct, &exchange, &factors, monitor)?;
+    let reused = notes.noted(reused);
+    // They are large, and the gather needs memory.
+    drop(factors);
+
+    monitor.stage(Stage::FinalGather)?;
+    let mut cache = RadianceCache::new(sources, texels, direct, exchange, options, monitor)?;
+    let gathered = rounds::gather(&mut cache, texels, direct, reused, options, monitor)?;
+    let (indirect, gathered) = notes.noted(gathered);
+    Ok((Bounces { indirect, cache: Some(cache), exchanged, gathered: Some(gathered) }, notes))
 }

@@ -5,6 +5,7 @@ use lumbre_scene::{IrradianceVolume, Transform};
 
 use crate::BakeReport;
 use crate::finish::{BakedMap, BakedObject};
+use crate::report::StageNotes;
 
 /// What a bake has made of a [`StaticScene`](crate::StaticScene).
 #[derive(Debug)]
@@ -22,9 +23,10 @@ pub struct BakedScene {
 
 impl BakedScene {
     /// Of a scene that has nothing to bake.
-    pub(crate) fn dark(why: &str, mut report: BakeReport) -> Self {
-        report.skipped.push(format!("everything: {why}"));
-        report.error_reached = true;
+    pub(crate) fn dark(why: &str, triangles: usize, mut notes: StageNotes) -> Self {
+        notes.skipped.push(format!("everything: {why}"));
+        let mut report = BakeReport { triangles, error_reached: true, ..BakeReport::default() };
+        report.set_notes(notes);
         Self { objects: Vec::new(), maps: Vec::new(), volume: None, report }
     }
 }

@@ -9,8 +9,7 @@ use crate::denoise::texel_rows::BESIDE_A_ROW;
 use crate::denoise::{Estimates, Nearness};
 use crate::error::mebibytes;
 use crate::final_gather::{GatherSums, TexelRadiance};
-use crate::radiosity::{Patch, Patches, Resolution};
-use crate::rebake::TexelSamples;
+use crate::radiosity::{Patch, PatchResolution, Patches};
 use crate::report::StageNotes;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::sources::Direct;
@@ -24,7 +23,7 @@ const TRIANGLE_BYTES: u64 =
     (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32) as u64;
 
 /// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
-/// round, raw and smoothed estimates with their guides, its nearness, nineteen lists of one number each for the
+/// round, raw and smoothed estimates with their features, its nearness, nineteen lists of one number each for the
 /// errors and what a round aims at, its chart, the light around it, and its block with its share of what is in view
 /// from there. (The sums of the shared samples of direct light need less, and are freed by then.)
 const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
@@ -37,8 +36,8 @@ const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + 7 * 4) as u64;
 
 /// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later:
-/// estimates with their bias, the numbers of the weighted fit, guides with the noise, products, and nearness. Besides,
-/// its place among the covered texels and its surface, and what rays that hit it read.
+/// estimates with their bias, the numbers of the weighted fit, features with the noise, products, and nearness.
+/// Besides, its place among the covered texels and its surface, and what rays that hit it read.
 const MAP_TEXEL_BYTES: u64 = 4 * (13 + 12 + 7 + 1 + 3) + 8 + size_of::<TexelRadiance>() as u64;
 
 /// Per texel of a map, for separate maps of direct and bounced light: both as computed, as filled, and as divided.
@@ -75,15 +74,6 @@ const GUIDED_PATCH_BYTES: u64 =
 /// by then the form factors themselves are freed, which need as much.
 const GUIDE_PAIR_BYTES: u64 = 2 * 2 * 2 * (4 + 4);
 
-/// Per covered texel, for the samples that the bake returns.
-pub(crate) const SAMPLES_BYTES: u64 = size_of::<TexelSamples>() as u64;
-
-/// Per covered texel, for the samples of a previous bake: the samples themselves, the sums and direct light reused from
-/// them, the change of its light, and its light and direct light in the previous bake.
-pub(crate) const FORMER_SAMPLES_BYTES: u64 =
-    (size_of::<TexelSamples>() + size_of::<GatherSums>() + size_of::<Option<Direct>>() + 8 + 4 + 4 + 4 * 12)
-        as u64;
-
 /// Memory that is not counted above: threads, buffers, the checkpoint's block.
 const OTHER_BYTES: u64 = 32 << 20;
 
@@ -114,17 +104,18 @@ pub(crate) fn check_texels(
 ///
 /// # Errors
 /// [`BakeError::Memory`] if even the coarsest resolution does not fit.
-pub(crate) fn resolution(
+pub(crate) fn patch_resolution(
     texels: &CoveredTexels<'_>,
     sample_bytes: u64,
     options: &BakeOptions,
-) -> Result<(Resolution, StageNotes), BakeError> {
+) -> Result<(PatchResolution, StageNotes), BakeError> {
     let effort = options.effort();
     let CoveredTexels { scene, layout, list: texels, contacts, side: texel_side, .. } = texels;
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let requested_rays = effort.form_factor_rays(texels.len(), options.error);
-    let mut resolution = Resolution { patch_side: side, form_factor_rays: requested_rays, memory_bytes: 0 };
+    let mut resolution =
+        PatchResolution { patch_side: side, form_factor_rays: requested_rays, memory_bytes: 0 };
     let triangles = scene.triangles.len() as u64;
     let covered = texels.len() as u64;
     let footprint_points = texels.iter().map(|texel| match &texel.footprint {
@@ -172,7 +163,7 @@ pub(crate) fn resolution(
 }
 
 /// Bytes for the patches, their form factors and the sampling guide.
-fn exchange_bytes(resolution: &Resolution, patches: u64) -> u64 {
+fn exchange_bytes(resolution: &PatchResolution, patches: u64) -> u64 {
     // Every patch casts a minimum of rays, however small it is. There can be no more pairs than pairs of patches.
     let rays = (resolution.form_factor_rays as u64 + 32 * patches).min(patches.saturating_mul(patches));
     // The guide's regions are no more than the patches, and their pairs no more than those of the patches.

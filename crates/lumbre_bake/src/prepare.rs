@@ -12,14 +12,25 @@ use crate::sources::light_sources::shines_inside_only;
 use crate::sources::{Emitter, Sources};
 use crate::{BakeError, BakeOptions};
 
-/// Lays out the lightmap of every object, with `density` texels per canonical unit.
+/// What is decided before anything is laid out.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BakePlan {
+    /// The space that the bake works in.
+    pub space: Canonical,
+    /// Texels per canonical unit.
+    pub density: f64,
+    /// Bytes per covered texel for samples of the former bake and for the next one.
+    pub sample_bytes: u64,
+}
+
+/// Lays out the lightmap of every object.
 pub(crate) fn layout(
     input: &Arc<StaticScene>,
-    space: Canonical,
-    density: f64,
+    plan: &BakePlan,
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(LightmapLayout, StageNotes), BakeError> {
+    let BakePlan { space, density, .. } = *plan;
     let (input, options, stop) = (Arc::clone(input), *options, monitor.stop().clone());
     monitor.run_detached(0.0, move || {
         let mut layouter = Layouter { space, density, options: &options, stop: &stop, warnings: Vec::new() };

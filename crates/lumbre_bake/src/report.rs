@@ -299,13 +299,26 @@ impl StageNotes {
     }
 }
 
-impl BakeReport {
-    /// The result of a stage, whose notes are added to the report.
-    pub(crate) fn noted<T>(&mut self, (result, notes): (T, StageNotes)) -> T {
+impl StageNotes {
+    /// Notes that something is left out, for which nothing stands.
+    pub fn without<T: Default>(&mut self, what: &str, why: &str) -> T {
+        self.skipped.push(format!("{what}: {why}"));
+        T::default()
+    }
+
+    /// The result of a stage, whose notes are added to these.
+    pub fn noted<T>(&mut self, (result, notes): (T, StageNotes)) -> T {
         self.rays += notes.rays;
         self.warnings.extend(notes.warnings);
         self.skipped.extend(notes.skipped);
         result
+    }
+}
+
+impl BakeReport {
+    /// Sets what the notes of all stages say.
+    pub(crate) fn set_notes(&mut self, notes: StageNotes) {
+        (self.rays, self.warnings, self.skipped) = (notes.rays, notes.warnings, notes.skipped);
     }
 
     /// Mean irradiance, mean of the channels, W/m².

@@ -241,6 +241,20 @@ pub(crate) fn triangle_point(u: f32, v: f32) -> (f32, f32) {
     }
 }
 
+/// Finds the interval of a cumulative distribution that contains `u`: its place, its begin and its end. `end` is where
+/// an item's interval ends and the next item's begins; from the last end on, the last interval counts. `None` without
+/// items.
+pub(crate) fn interval_at<T, N: Copy + PartialOrd + Default>(
+    items: &[T],
+    end: impl Fn(&T) -> N,
+    u: N,
+) -> Option<(usize, N, N)> {
+    let last = items.len().checked_sub(1)?;
+    let place = items.partition_point(|item| end(item) <= u).min(last);
+    let begin = if place == 0 { N::default() } else { end(&items[place - 1]) };
+    Some((place, begin, end(&items[place])))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -273,6 +287,17 @@ mod tests {
             Stream::SteepLight(replicate @ 0..3) => Stream::SteepLight(replicate + 1),
             Stream::SteepLight(_) | Stream::Test(_) => return None,
         })
+    }
+
+    #[test]
+    fn an_interval_contains_the_number_that_it_is_found_by() {
+        let ends = [0.25f32, 0.25, 1.0];
+        let found = |u| interval_at(&ends, |&end| end, u);
+        assert_eq!(found(0.0), Some((0, 0.0, 0.25)));
+        // The second interval is empty.
+        assert_eq!(found(0.25), Some((2, 0.25, 1.0)));
+        assert_eq!(found(1.5), Some((2, 0.25, 1.0)));
+        assert_eq!(interval_at(&[], |&end: &f32| end, 0.5), None);
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! The two indices of a texel, as types that cannot be confused: its index among the texels of all maps, and its index
-//! among the covered texels, which show a surface.
+//! The indices of a texel, as types that cannot be confused: its index among the texels of all maps, its index among
+//! the covered texels, which show a surface, and the index of its map.
 
 /// The index of a texel among those of all maps, map by map and row by row. Lists "per texel of all maps" are in this
 /// order.
@@ -9,6 +9,18 @@ pub(crate) struct MapTexel(pub u32);
 /// The index of a texel among the covered texels. Lists "of the covered texels" are in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct CoveredTexel(pub u32);
+
+/// The index of a map of the layout, which is also that of the object that the map belongs to. Objects share images
+/// only in finished maps (`finish::pages`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct MapIndex(pub u32);
+
+impl MapIndex {
+    /// Its place in a list per map, or per object.
+    pub fn place(self) -> usize {
+        self.0 as usize
+    }
+}
 
 impl MapTexel {
     /// The index for a place in a list per texel of all maps, of which there are at most 2^26.

@@ -65,7 +65,7 @@ fn texels_crossed_on(
     index: usize,
 ) -> Vec<(MapTexel, [DVec2; 2])> {
     let triangle = &scene.triangles[index];
-    let map = &layout.maps[triangle.object as usize];
+    let map = &layout.maps[triangle.map.place()];
     if scene.stop.is_cancelled() || !has_contact_lines(triangle) {
         return Vec::new();
     }

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::scene::{BakeScene, LightmapLayout, Receiver, SceneTriangle, Side};
-use crate::texel_index::{CoveredTexel, MapTexel};
+use crate::texel_index::{CoveredTexel, MapIndex, MapTexel};
 use crate::visibility::clipping::clip;
 
 /// A point on a triangle that a texel shows.
@@ -46,7 +46,7 @@ pub(crate) enum Footprint {
 #[derive(Clone, Debug)]
 pub(crate) struct Texel {
     pub index: MapTexel,
-    pub object: u32,
+    pub map: MapIndex,
     /// Column and row in its map.
     pub x: u32,
     pub y: u32,
@@ -64,15 +64,15 @@ pub(crate) const GRID: usize = (COARSE * COARSE) as usize;
 
 /// The covered texels of all maps, map by map and row by row.
 pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texel> {
-    let mut by_object: Vec<Vec<u32>> = vec![Vec::new(); layout.maps.len()];
+    let mut by_map: Vec<Vec<u32>> = vec![Vec::new(); layout.maps.len()];
     for (index, triangle) in scene.triangles.iter().enumerate() {
-        by_object[triangle.object as usize].push(index as u32);
+        by_map[triangle.map.place()].push(index as u32);
     }
-    let maps: Vec<Vec<Texel>> = by_object
+    let maps: Vec<Vec<Texel>> = by_map
         .par_iter()
         .enumerate()
-        .map(|(object, triangles)| {
-            let map = &layout.maps[object];
+        .map(|(number, triangles)| {
+            let map = &layout.maps[number];
             let mut covers: Vec<(u32, u32)> = Vec::new();
             for &index in triangles {
                 if scene.stop.is_cancelled() {
@@ -98,7 +98,7 @@ pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texe
                         _ => triangles().next()?,
                     };
                     let index = map.texel(x, y);
-                    Some(Texel { index, object: object as u32, x, y, triangle, footprint })
+                    Some(Texel { index, map: MapIndex(number as u32), x, y, triangle, footprint })
                 })
                 .collect()
         })

@@ -27,11 +27,11 @@ const SEED: u32 = 0;
 const MIN_CLEARANCE: f32 = 1.0 / 64.0;
 
 /// Rays per texel that decide whether it is suspicious, so that its points are classified one by one.
-const PROBES: u32 = 6;
+const TEST_RAYS: u32 = 6;
 /// Rays per tile that is hidden or open throughout.
-const TILE_PROBES: u32 = 16;
+const TILE_TEST_RAYS: u32 = 16;
 /// Rays per texel once the time for exact classification is up.
-const LATE_PROBES: u32 = 2;
+const LATE_TEST_RAYS: u32 = 2;
 /// Rays per point that classify it as open or hidden.
 const POINT_RAYS: u32 = 8;
 /// Distance from a contact line, in texels, below which a point is classified by itself.
@@ -65,7 +65,7 @@ pub(crate) fn remove_hidden(
     divided.iter().for_each(|texel| is_suspect[texel.place()] = true);
     // The few rays of a texel may miss a hidden corner that its neighbours' rays have found.
     for (texel, _) in texels.iter().zip(&suspicious).filter(|(_, suspicious)| **suspicious) {
-        let map = &layout.maps[texel.object as usize];
+        let map = &layout.maps[texel.map.place()];
         map.neighbourhood(texel.x, texel.y, 1).for_each(|near| is_suspect[near.place()] = true);
     }
     let mut suspects: Vec<&mut Texel> =
@@ -113,34 +113,34 @@ fn suspicious_texels(
         };
         tiles.members.par_iter().map(check).collect::<Vec<(bool, u32)>>()
     })?;
-    let must_probe = |place: usize| suspicious_tiles[tiles.group_of[place] as usize].0;
+    let must_test = |place: usize| suspicious_tiles[tiles.group_of[place] as usize].0;
     monitor.pass(PASSES[0]);
     let suspicious = in_chunks(texels.len(), monitor, |place| {
-        let probes = if place >= ALWAYS_EXACT && clock.is_over() { LATE_PROBES } else { PROBES };
-        must_probe(place) && is_suspicious(scene, &texels[place], probes)
+        let rays = if place >= ALWAYS_EXACT && clock.is_over() { LATE_TEST_RAYS } else { TEST_RAYS };
+        must_test(place) && is_suspicious(scene, &texels[place], rays)
     })?;
-    let probed = (0..texels.len()).filter(|&place| must_probe(place)).count();
+    let tested = (0..texels.len()).filter(|&place| must_test(place)).count();
     let rays = suspicious_tiles.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
-    Ok((suspicious, rays + probed as u64 * u64::from(PROBES)))
+    Ok((suspicious, rays + tested as u64 * u64::from(TEST_RAYS)))
 }
 
-/// Whether the texels of a tile have to be probed thoroughly, and the rays cast. They need not be if all of the tile is
+/// Whether the texels of a tile have to be tested thoroughly, and the rays cast. They need not be if all of the tile is
 /// hidden or all of it is open, and a few rays for the whole tile are clear; nor if no contact line is known to cross
 /// the tile, and one ray from each texel is clear.
 fn suspicious_tile(scene: &BakeScene, members: &[&Texel], is_crossed: &[bool]) -> (bool, u32) {
     if scene.stop.is_cancelled() {
         return (false, 0);
     }
-    let probes = if is_free_tile(scene, members) {
-        TILE_PROBES as usize
+    let rays = if is_free_tile(scene, members) {
+        TILE_TEST_RAYS as usize
     } else if members.iter().all(|texel| !is_crossed[texel.index.place()] && has_all_lines(scene, texel)) {
-        members.len().max(TILE_PROBES as usize)
+        members.len().max(TILE_TEST_RAYS as usize)
     } else {
         return (true, 0);
     };
-    let probed = (0..probes).map(|ray| members[ray * members.len() / probes]);
-    let is_clear = |(ray, texel): (usize, &Texel)| probe(scene, texel, ray as u32) == Probe::Clear;
-    (!probed.enumerate().all(is_clear), probes as u32)
+    let tested = (0..rays).map(|ray| members[ray * members.len() / rays]);
+    let is_clear = |(ray, texel): (usize, &Texel)| test_ray(scene, texel, ray as u32) == TestRay::Clear;
+    (!tested.enumerate().all(is_clear), rays as u32)
 }
 
 /// Whether the contact lines on everything that a texel shows have been searched for.
@@ -163,7 +163,7 @@ fn is_free_tile(scene: &BakeScene, members: &[&Texel]) -> bool {
 
 /// The outcome of a ray from a texel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Probe {
+enum TestRay {
     Clear,
     /// It hits a lit surface almost at once.
     Blocked,
@@ -171,29 +171,29 @@ enum Probe {
     Hidden,
 }
 
-fn probe(scene: &BakeScene, texel: &Texel, ray: u32) -> Probe {
+fn test_ray(scene: &BakeScene, texel: &Texel, ray: u32) -> TestRay {
     let [x, y, u, v] = Sequence::new(SEED, Stream::HiddenTexel, texel.index.0).point(ray, 0);
-    let Some(point) = texel.point(scene, x, y) else { return Probe::Clear };
+    let Some(point) = texel.point(scene, x, y) else { return TestRay::Clear };
     let receiver = receiver(scene, &point);
     let direction = cosine_about(receiver.geometric_normal, u, v);
     match scene.classify_hit(receiver.origin, direction) {
-        SurfaceHit::Inside | SurfaceHit::Back => Probe::Hidden,
-        SurfaceHit::Lit { distance, .. } if distance < min_clearance(scene, texel) => Probe::Blocked,
-        SurfaceHit::Lit { .. } | SurfaceHit::None => Probe::Clear,
+        SurfaceHit::Inside | SurfaceHit::Back => TestRay::Hidden,
+        SurfaceHit::Lit { distance, .. } if distance < min_clearance(scene, texel) => TestRay::Blocked,
+        SurfaceHit::Lit { .. } | SurfaceHit::None => TestRay::Clear,
     }
 }
 
 /// Whether some ray of a texel suggests that part of it is hidden.
-fn is_suspicious(scene: &BakeScene, texel: &Texel, probes: u32) -> bool {
+fn is_suspicious(scene: &BakeScene, texel: &Texel, rays: u32) -> bool {
     let mut blocked = 0;
-    (0..probes).any(|ray| match probe(scene, texel, ray) {
-        Probe::Hidden => true,
+    (0..rays).any(|ray| match test_ray(scene, texel, ray) {
+        TestRay::Hidden => true,
         // In any corner of a room one ray may be blocked.
-        Probe::Blocked => {
+        TestRay::Blocked => {
             blocked += 1;
             blocked > 1
         }
-        Probe::Clear => false,
+        TestRay::Clear => false,
     })
 }
 
@@ -287,11 +287,11 @@ fn between_lines(points: &[FootprintPoint], lines: impl Iterator<Item = [DVec2; 
     groups
 }
 
-/// Classifies all points of a texel alike: as open if at least half of its probe rays are clear.
+/// Classifies all points of a texel alike: as open if at least half of its test rays are clear.
 fn classify_roughly(scene: &BakeScene, texel: &Texel) -> OpenPoints {
-    let clear = (0..PROBES).filter(|&ray| probe(scene, texel, ray) == Probe::Clear).count();
-    let open = if 2 * clear >= PROBES as usize { Vec::new() } else { vec![0] };
-    OpenPoints { open, rays: PROBES }
+    let clear = (0..TEST_RAYS).filter(|&ray| test_ray(scene, texel, ray) == TestRay::Clear).count();
+    let open = if 2 * clear >= TEST_RAYS as usize { Vec::new() } else { vec![0] };
+    OpenPoints { open, rays: TEST_RAYS }
 }
 
 /// Keeps only the open points of a texel; returns whether it has lost some.

@@ -25,14 +25,14 @@ impl TexelGroups {
     /// block too, but are not among its members: the members of a block of hidden texels are an empty list.
     pub fn blocks(texels: &[Texel], charts: &[u32], side: u32) -> Self {
         let key =
-            |texel: &Texel| [texel.object, charts[texel.triangle as usize], texel.x / side, texel.y / side];
+            |texel: &Texel| [texel.map.0, charts[texel.triangle as usize], texel.x / side, texel.y / side];
         Self::new(texels, key, |texel| !texel.is_hidden())
     }
 
     /// Tiles of at most 8 x 8 texels that show the same triangle. Hidden texels are members of their tile like all
     /// others.
     pub fn tiles(texels: &[Texel]) -> Self {
-        let key = |texel: &Texel| [texel.object, texel.triangle, texel.x / TILE_SIDE, texel.y / TILE_SIDE];
+        let key = |texel: &Texel| [texel.map.0, texel.triangle, texel.x / TILE_SIDE, texel.y / TILE_SIDE];
         Self::new(texels, key, |_| true)
     }
 

@@ -29,7 +29,7 @@ impl TileSequence {
     pub fn new(seed: u32, stream: Stream, texel: &Texel, first_section: u32) -> Self {
         // Maps are at most 8192 texels wide: 10 bits of tiles.
         let tile = ((texel.y / SIDE) << 10) | (texel.x / SIDE);
-        let sequence = Sequence::new(seed, stream, tile).of(texel.object);
+        let sequence = Sequence::new(seed, stream, tile).of(texel.map.0);
         let morton_index = morton(texel.x % SIDE, texel.y % SIDE);
         Self { sequence, first_set: sequence.set(0), morton_index, first_section: first_section.max(1) }
     }
@@ -66,10 +66,10 @@ fn morton(x: u32, y: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::coverage::footprint::Footprint;
-    use crate::texel_index::MapTexel;
+    use crate::texel_index::{MapIndex, MapTexel};
 
     fn texel(x: u32, y: u32) -> Texel {
-        Texel { index: MapTexel(0), object: 0, x, y, triangle: 0, footprint: Footprint::Hidden }
+        Texel { index: MapTexel(0), map: MapIndex(0), x, y, triangle: 0, footprint: Footprint::Hidden }
     }
 
     #[test]

@@ -50,18 +50,18 @@ pub(crate) fn sum_of_variances<S: Simd>(simd: S, values: &[f32x8<S>; VALUES]) ->
 }
 
 /// The features of each texel. Its noise is the mean variance of its neighbourhood, as a variance from only four
-/// replicates is itself noisy. The guides, by which edges are detected, are the means of each half of the replicates
+/// replicates is itself noisy. The features, by which edges are detected, are the means of each half of the replicates
 /// over the adjacent texels. The weights of each half are computed from the other half: weights correlated with the
 /// noise that they average would pull the mean towards the most frequent values, and lose light (Rousselle, Knaus,
 /// Zwicker, "Adaptive Rendering with Non-Local Means", 2012).
 pub(crate) struct Features<'a, const STEP: usize> {
-    /// The reach of the guides, in steps.
+    /// The reach of the means, in steps.
     pub steps: usize,
     pub estimates: &'a Smoothed,
     pub variances: &'a ChannelRows<1>,
 }
 
-/// Three channels of the guide for each half's weights, and the noise.
+/// Three channels of the features for each half's weights, and the noise.
 pub(crate) const FEATURES: usize = 2 * 3 + 1;
 pub(crate) const NOISE: usize = 2 * 3;
 
@@ -87,8 +87,8 @@ impl<const STEP: usize> Kernel<FEATURES> for Features<'_, STEP> {
         );
         let scale = simd.splat_f32x8(1.0) / (count * REPLICATES_PER_HALF as f32).max(1.0);
         let mut features = [block.mean(self.variances, 0, NOISE_STEPS, STEP); FEATURES];
-        for (guide, sum) in features.iter_mut().zip(sums) {
-            *guide = sum * scale;
+        for (feature, sum) in features.iter_mut().zip(sums) {
+            *feature = sum * scale;
         }
         features
     }

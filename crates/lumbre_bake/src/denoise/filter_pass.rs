@@ -16,7 +16,7 @@ pub(crate) struct FilterPass {
     /// directions in which they are near.
     pub near: f32,
     /// The reach, in steps, of the means by which edges are detected.
-    pub guide_steps: usize,
+    pub feature_steps: usize,
     /// The share of the input's variance that noise alone leaves in the estimate of the squared bias.
     pub bias_noise: f32,
 }

@@ -10,6 +10,8 @@ pub(crate) mod kernel;
 pub(crate) mod nearness;
 pub(crate) mod neighbourhoods;
 pub(crate) mod neighbours;
+#[cfg(test)]
+mod neighbours_tests;
 pub(crate) mod plane;
 pub(crate) mod replicates;
 pub(crate) mod smooth;

@@ -91,7 +91,7 @@ impl<'a> Neighbourhoods<'a> {
     /// The values of each covered texel; zero for hidden ones.
     pub fn read<const N: usize>(&self, channels: &ChannelRows<N>) -> Vec<[f32; N]> {
         let value_of = |texel: &Texel| {
-            let row = self.first_rows[texel.object as usize] + texel.y as usize;
+            let row = self.first_rows[texel.map.place()] + texel.y as usize;
             if texel.is_hidden() { [0.0; N] } else { self.grid.get(channels, row, texel.x as usize) }
         };
         self.texels.list.par_iter().map(value_of).collect()

@@ -27,10 +27,10 @@ use crate::coverage::MapAxes;
 /// The first pass reaches a few texels, almost whatever is near. Its `bias_noise`: a replicate has four times the
 /// variance of the texel's mean, a block of 3 x 3 a ninth of that, and the radius of the bias holds 49 / 9 blocks,
 /// twice for two halves: 4 / 9 / sqrt(2 * 49 / 9).
-const FIRST: FilterPass = FilterPass { width: 2.5, near: 1.0, guide_steps: 1, bias_noise: 0.135 };
+const FIRST: FilterPass = FilterPass { width: 2.5, near: 1.0, feature_steps: 1, bias_noise: 0.135 };
 /// The second pass reaches far only where all other surfaces are far. Its input is correlated over some 20 texels, so
 /// that its blocks hold only four independent values, and the radius of the bias four such blocks.
-const SECOND: FilterPass = FilterPass { width: 9.0, near: 12.0, guide_steps: 0, bias_noise: 0.33 };
+const SECOND: FilterPass = FilterPass { width: 9.0, near: 12.0, feature_steps: 0, bias_noise: 0.33 };
 
 /// The smoothed estimates of every covered texel, and the squared bias that smoothing may have brought, mean of the
 /// channels. `nearness` is, per texel, the mean of that of the surfaces or lights that its samples reached.
@@ -77,7 +77,7 @@ impl FilterPass {
     ) {
         let variances = grid.compute(&Variances(estimates));
         let features =
-            grid.compute(&Features::<STEP> { steps: self.guide_steps, estimates, variances: &variances });
+            grid.compute(&Features::<STEP> { steps: self.feature_steps, estimates, variances: &variances });
         drop(variances);
         let fit = Fit::<STEP, COLUMNS> { pass: self, estimates, squared_nearness, features: &features };
         let smoothed = grid.compute(&fit);
@@ -174,7 +174,7 @@ mod tests {
     use fearless_simd::Level;
     use glam::Vec2;
 
-    use super::super::neighbours::tests::{random_channels, random_grid};
+    use super::super::neighbours_tests::{random_channels, random_grid};
     use super::super::surface::Surface;
     use super::*;
 

@@ -10,8 +10,8 @@ use super::neighbours::{Block, CENTER, NeighbourRow};
 use super::plane::{Planes, REPLICATES_PER_HALF, VALUES};
 use super::texel_rows::{ChannelRows, lanes};
 
-/// Squared differences of guides that amount to this many variances give a weight of e⁻¹.
-const GUIDE_VARIANCES: f32 = 8.0;
+/// Squared differences of features that amount to this many variances give a weight of e⁻¹.
+const FEATURE_VARIANCES: f32 = 8.0;
 
 /// Fits planes over `COLUMNS` columns and as many rows, `STEP` texels apart.
 pub(crate) struct Fit<'a, const STEP: usize, const COLUMNS: usize> {
@@ -38,10 +38,10 @@ impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, C
             block.center(self.squared_nearness, 1) * (2.0 * near),
             block.center(self.squared_nearness, 2) * near + width,
         ];
-        // The variance of a guide relative to that of a texel's mean: twice as much for a half, divided by the texels
+        // The variance of a feature relative to that of a texel's mean: twice as much for a half, divided by the texels
         // averaged.
-        let guide_noise = GUIDE_VARIANCES * 2.0 / ((2 * self.pass.guide_steps + 1) as f32).powi(2);
-        let texels = CenterTexels { features, distance_scales, guide_noise };
+        let feature_noise = FEATURE_VARIANCES * 2.0 / ((2 * self.pass.feature_steps + 1) as f32).powi(2);
+        let texels = CenterTexels { features, distance_scales, feature_noise };
         let mut weights = [[zero; COLUMNS]; 2];
         let mut planes = Planes::new(simd);
         for row in block.rows(COLUMNS / 2, STEP) {
@@ -75,8 +75,8 @@ struct CenterTexels<S: Simd> {
     features: [f32x8<S>; FEATURES],
     /// The factors of x², x y and y² of a distance of x columns and y rows.
     distance_scales: [f32x8<S>; 3],
-    /// The factor of the noise of two texels, by which squared differences of their guides are divided.
-    guide_noise: f32,
+    /// The factor of the noise of two texels, by which squared differences of their features are divided.
+    feature_noise: f32,
 }
 
 impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
@@ -92,17 +92,17 @@ impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
     ) {
         let simd = block.simd;
         let zero = simd.splat_f32x8(0.0);
-        let CenterTexels { features: center, distance_scales: [xx, xy, yy], guide_noise } = texels;
+        let CenterTexels { features: center, distance_scales: [xx, xy, yy], feature_noise } = texels;
         let y = row.down as f32;
         let mut features = [self.features.window(row, NOISE); FEATURES];
-        for (place, guide) in features.iter_mut().enumerate() {
-            *guide = self.features.window(row, place);
+        for (place, window) in features.iter_mut().enumerate() {
+            *window = self.features.window(row, place);
         }
         for place in 0..COLUMNS {
             let at = CENTER - COLUMNS / 2 * STEP + place * STEP;
             let x = place as f32 * STEP as f32 - (COLUMNS / 2 * STEP) as f32;
             let noise: f32x8<S> = lanes(simd, features[NOISE], at);
-            let expected = (center[NOISE] + noise) * *guide_noise;
+            let expected = (center[NOISE] + noise) * *feature_noise;
             let inverse = simd.splat_f32x8(1.0) / expected.max(f32::MIN_POSITIVE);
             // Rounding may make it negative along a surface that is very near.
             let distance_term = (*xx * (x * x) + *xy * (x * y) + *yy * (y * y)).max(zero);
@@ -110,8 +110,8 @@ impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
             for (half, weights) in weights.iter_mut().enumerate() {
                 let mut squares = [zero; 3];
                 for (channel, square) in squares.iter_mut().enumerate() {
-                    let guide: f32x8<S> = lanes(simd, features[3 * half + channel], at);
-                    let difference = guide - center[3 * half + channel];
+                    let feature: f32x8<S> = lanes(simd, features[3 * half + channel], at);
+                    let difference = feature - center[3 * half + channel];
                     *square = difference * difference;
                 }
                 let squared_difference = squares[0] + squares[1] + squares[2];
@@ -136,7 +136,7 @@ fn falloff<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
 mod tests {
     use fearless_simd::Level;
 
-    use super::super::neighbours::tests::{random_channels, random_grid};
+    use super::super::neighbours_tests::{random_channels, random_grid};
     use super::super::texel_rows::{LANES, MARGIN};
     use super::*;
     use crate::denoise::surface::{NONE, is_continuous};
@@ -171,7 +171,7 @@ mod tests {
     #[test]
     fn the_fit_is_the_plane_of_weighted_least_squares() {
         let grid = random_grid(Level::new());
-        let pass = FilterPass { width: 9.0, near: 0.5, guide_steps: 0, bias_noise: 0.0 };
+        let pass = FilterPass { width: 9.0, near: 0.5, feature_steps: 0, bias_noise: 0.0 };
         let estimates = random_channels(&grid, 1);
         let numbers = random_channels(&grid, 2);
         // A square of a matrix is negative in no direction.
@@ -212,7 +212,7 @@ mod tests {
                             (0..3).map(|c| (center[3 * half + c] - other[3 * half + c]).powi(2)).sum::<f64>();
                         let nearness = near[0] * x * x + 2.0 * near[1] * x * y + near[2] * y * y;
                         let distance_term = (x * x + y * y) / 81.0 + 0.25 * nearness;
-                        // A guide has twice the variance, and eight variances have weight e⁻¹.
+                        // A feature has twice the variance, and eight variances have weight e⁻¹.
                         let exponent =
                             distance_term + squared_difference / (8.0 * 2.0 * (center[NOISE] + other[NOISE]));
                         let weight = (1.0 - exponent / 16.0).max(0.0).powi(16);

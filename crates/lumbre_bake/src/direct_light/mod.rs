@@ -79,10 +79,7 @@ pub(crate) fn direct_light(
         let begun = monitor.seconds();
         sampler.refine(&mut light, &local, most, goals.individual, monitor)?;
         if let Some(shared) = &mut shared {
-            let left = light.variance_left(&local);
-            let goal = |share: f64| goals.of_shared(share, left);
-            let share = |samples: f64| goals.share_for(samples);
-            shared.refine(&local, (share(0.0), &share), &goal, monitor)?;
+            shared.refine(&local, &goals, light.variance_left(&local), monitor)?;
         }
         seconds_of_last_goal = monitor.seconds() - begun;
     }

@@ -7,6 +7,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::error_goals::ErrorGoals;
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
 use super::views::ErrorsInViews;
@@ -157,17 +158,17 @@ impl<'a> SharedLight<'a> {
         Denoised::new(&self.neighbourhoods, &raw, nearness, self.options.denoise, monitor)
     }
 
-    /// Takes more rounds. `goal` maps a share of the requested squared error to the sum over all texels of squared
-    /// errors, relative to local light, that may then be left. `share` maps the samples per texel that the `least`
-    /// share is expected to need to the share that is aimed at.
+    /// Takes more rounds, until no more of the requested squared error is left than `goals` allow sources that share
+    /// samples, of which the individually sampled ones leave `left_by_individual`.
     pub fn refine(
         &mut self,
         local: &LocalLight,
-        (least, share): (f64, &impl Fn(f64) -> f64),
-        goal: &impl Fn(f64) -> f64,
+        goals: &ErrorGoals,
+        left_by_individual: f64,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
-        let (mut before, mut chosen_share) = ([f64::INFINITY; 2], None);
+        let least_goal = goals.of_shared(goals.share_for(0.0), left_by_individual);
+        let (mut before, mut chosen_goal) = ([f64::INFINITY; 2], None);
         loop {
             let relative = local.relative_errors(&self.smoothed.errors());
             let is_sampled = |texel: &CoveredTexel| self.sums[texel.place()].samples > 0;
@@ -193,12 +194,13 @@ impl<'a> SharedLight<'a> {
             };
             // Before a round can reach the least share, a few uncertain texels dominate and the samples of the others
             // cannot be foreseen.
-            if chosen_share.is_none() && left <= MAX_REDUCTION * goal(least) {
+            if chosen_goal.is_none() && left <= MAX_REDUCTION * least_goal {
                 let allocator = allocator(&relative.cautious);
-                let foreseen = taken + allocator.added(&allocator.within(budget, caution * goal(least)));
-                chosen_share = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
+                let foreseen = taken + allocator.added(&allocator.within(budget, caution * least_goal));
+                let per_texel = (foreseen * REPLICATES as u64) as f64 / count.max(1) as f64;
+                chosen_goal = Some(goals.of_shared(goals.share_for(per_texel), left_by_individual));
             }
-            let goal = goal(chosen_share.unwrap_or(least));
+            let goal = chosen_goal.unwrap_or(least_goal);
             let sums = errors.sums();
             let is_open =
                 |place: usize| sums[place] > goal * ENOUGH && sums[place] <= STALLED * before[place];

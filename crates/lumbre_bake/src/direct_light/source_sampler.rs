@@ -197,7 +197,7 @@ impl<'a> SourceSampler<'a> {
         let seen_at = |place: MapTexel| texels.open_at(place).map(|texel| direct[texel.place()].seen);
         let is_doubtful = |&(covered, texel): &(CoveredTexel, &Texel)| {
             let Direct { seen, sampled, .. } = direct[covered.place()];
-            let map = &texels.layout.maps[texel.object as usize];
+            let map = &texels.layout.maps[texel.map.place()];
             let differs = |other: VisibilitySummary| other.partly || other.signature != seen.signature;
             let mut near = map.neighbourhood(texel.x, texel.y, REACH);
             sampled && self.is_wanted(covered) && near.any(|near| seen_at(near).is_some_and(differs))
@@ -296,6 +296,7 @@ mod tests {
     use crate::coverage::{Footprint, barycentric};
     use crate::scene::laid_out::laid_out;
     use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
+    use crate::texel_index::MapIndex;
 
     /// The sun's shadow of a plate ends on a triangle, whose chart covers the texels along its longest side only in
     /// part. The texels' light must be that of the covered part, and not of the few points that stand for it.
@@ -344,7 +345,9 @@ mod tests {
         };
         let open = direct.texels.iter().map(|direct| direct.baked.x).fold(0.0, f32::max);
         let (mut squares, mut of_points, mut stated, mut edges) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
-        for (texel, direct) in texels.list.iter().zip(&direct.texels).filter(|(texel, _)| texel.object == 0) {
+        for (texel, direct) in
+            texels.list.iter().zip(&direct.texels).filter(|(texel, _)| texel.map == MapIndex(0))
+        {
             let Footprint::Points(points) = &texel.footprint else { continue };
             let triangle = &scene.triangles[texel.triangle as usize];
             let (mut covered, mut lit) = (0.0, 0.0);

@@ -112,11 +112,11 @@ impl Views {
         self.texels.iter().map(|&texels| f64::from(texels)).sum::<f64>().max(1.0)
     }
 
-    /// Per covered texel, the share in (0, 1] that may be left of its squared error if of that in the view from each
-    /// block `of_blocks` may be left, and of the whole level's at most `of_whole`; but at least the `least` share. What
-    /// the worst view needs is enough for those that are neglected. What is in view of each other is taken to need the
-    /// same: a block's own view decides what it needs.
-    pub fn shares(&self, of_blocks: &[f64], of_whole: f64, least: f64, squares: &[f32]) -> Vec<f32> {
+    /// Per covered texel, the share in (0, 1] of its squared error in `squares` that may be left. What the worst view
+    /// needs is enough for those that are neglected. What is in view of each other is taken to need the same: a block's
+    /// own view decides what it needs.
+    pub fn shares(&self, left: &SharesLeft<'_>, squares: &[f32]) -> Vec<f32> {
+        let SharesLeft { of_blocks, of_whole, least } = *left;
         let least_share = least as f32;
         let needs: Vec<f64> = of_blocks.iter().map(|share| share.recip()).collect();
         let least = self.worst(&needs).max(1.0).recip();
@@ -132,6 +132,17 @@ impl Views {
         }
         shares
     }
+}
+
+/// Which shares of squared errors may be left, each in (0, 1].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SharesLeft<'a> {
+    /// Of that in the view from each block.
+    pub of_blocks: &'a [f64],
+    /// At most so much of the whole level's.
+    pub of_whole: f64,
+    /// At least so much of each texel's.
+    pub least: f64,
 }
 
 /// Squared errors relative to local light, in the whole level and in the view from each block of texels.
@@ -161,7 +172,8 @@ impl<'a> ErrorsInViews<'a> {
         let share = |square: f64, goal: f64| (goal / square.max(f64::MIN_POSITIVE)).clamp(least, 1.0);
         let per_texel = goal / self.views.seen_texels();
         let of_blocks: Vec<f64> = self.in_views.iter().map(|&square| share(square, per_texel)).collect();
-        self.views.shares(&of_blocks, share(self.sum, goal), least, self.squares)
+        let left = SharesLeft { of_blocks: &of_blocks, of_whole: share(self.sum, goal), least };
+        self.views.shares(&left, self.squares)
     }
 }
 

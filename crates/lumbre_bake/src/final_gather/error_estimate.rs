@@ -151,12 +151,12 @@ pub(crate) fn patch_bias(
     reads: &TexelReads,
 ) -> Vec<PatchBias> {
     let later_bounces = reads.reflectance / (1.0 - reads.reflectance);
-    let maps = texels.iter().map(|texel| texel.object as usize + 1).max().unwrap_or(0);
+    let maps = texels.iter().map(|texel| texel.map.place() + 1).max().unwrap_or(0);
     let mut map_checks = vec![Checks::default(); maps];
     let texel_checks: Vec<Checks> =
         gathered.par_iter().zip(raw).map(|(sums, raw)| Checks::of(sums, mean(raw))).collect();
     for (texel, checks) in texels.iter().zip(&texel_checks) {
-        map_checks[texel.object as usize].add(checks);
+        map_checks[texel.map.place()].add(checks);
     }
     // The difference per unit of light by bounces.
     let map_ratios: Vec<DVec3> = map_checks
@@ -171,7 +171,7 @@ pub(crate) fn patch_bias(
         if checks.count < 2.0 {
             return LocalBias::default();
         }
-        let of_map = map_ratios[texel.object as usize] * checks.light / checks.count;
+        let of_map = map_ratios[texel.map.place()] * checks.light / checks.count;
         let (excess, known, variance) = checks.difference_beyond(of_map);
         let correction = of_map + known * excess;
         let square = |v: DVec3| (v.element_sum() / 3.0).powi(2);

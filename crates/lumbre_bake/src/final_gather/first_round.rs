@@ -98,7 +98,7 @@ fn representatives(texels: &CoveredTexels<'_>) -> Vec<CoveredTexel> {
             if whole_at(texel.index).is_none() {
                 return place;
             }
-            let map = &texels.layout.maps[texel.object as usize];
+            let map = &texels.layout.maps[texel.map.place()];
             let corner = map.texel(texel.x / BLOCK_SIDE * BLOCK_SIDE, texel.y / BLOCK_SIDE * BLOCK_SIDE);
             whole_at(corner).filter(|&corner| chart(corner) == chart(place)).unwrap_or(place)
         })

@@ -167,7 +167,7 @@ impl RadianceCache<'_> {
             let Some(hit) = &mut incident.hit else { continue };
             if hit.is_steep {
                 let sequence = Sequence::new(seed, Stream::SteepLight(replicate as u32), texel.index.0);
-                let (direct, rays) = self.direct_light_at(hit, sequence.of(sample));
+                let (direct, rays) = self.direct_light_at(hit.triangle, hit.at, sequence.of(sample));
                 hit.direct = direct;
                 contribution.rays += rays;
             }

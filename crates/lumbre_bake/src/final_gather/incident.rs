@@ -7,7 +7,7 @@ use std::f32::consts::FRAC_1_PI;
 use glam::{Vec2, Vec3};
 
 use super::radiance_cache::RadianceCache;
-use crate::radiosity::{GuidedPatch, PatchIndex, Region, RowPart};
+use crate::radiosity::{GuidedPatch, PatchIndex, RegionIndex, RowPart};
 use crate::sampling::{cosine_about, triangle_point};
 use crate::scene::{Receiver, Side, SurfaceHit};
 use crate::texel_index::MapTexel;
@@ -17,7 +17,7 @@ use crate::texel_index::MapTexel;
 pub(crate) struct GatherRequest {
     pub receiver: Receiver,
     /// The receiver's region of the guide; without one, only cosine rays are cast.
-    pub region: Option<Region>,
+    pub region: Option<RegionIndex>,
     /// The sample's point in the unit square.
     pub u: f32,
     pub v: f32,

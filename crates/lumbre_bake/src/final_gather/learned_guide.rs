@@ -4,15 +4,15 @@
 //! Novák, "Practical Path Guiding for Efficient Light-Transport Simulation", 2017). The guide itself is in
 //! `radiosity::sampling_guide`.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::gather_sums::{GatherSums, UnguidedLight};
 use super::radiance_cache::RadianceCache;
 use crate::coverage::Texel;
-use crate::radiosity::{Discovery, PatchIndex, Region};
+use crate::radiosity::{Discovery, PatchIndex, RegionIndex};
 use crate::scene::Side;
 
 /// A sample counts as a discovery if it brought more than this multiple of the mean sample of its texel.
@@ -24,9 +24,9 @@ pub(crate) fn learn(cache: &mut RadianceCache<'_>, texels: &[Texel], gathered: &
         return;
     }
     // Per receiving region, all its light, and the light by patch that was discovered.
-    let mut light_of_regions: BTreeMap<Region, (f64, BTreeMap<PatchIndex, f64>)> = BTreeMap::new();
+    let mut light_of_regions: BTreeMap<RegionIndex, (f64, BTreeMap<PatchIndex, f64>)> = BTreeMap::new();
     let region = |texel: &Texel| region_of(cache, texel);
-    let regions: Vec<Option<Region>> = texels.par_iter().map(region).collect();
+    let regions: Vec<Option<RegionIndex>> = texels.par_iter().map(region).collect();
     for (region, sums) in regions.into_iter().zip(&mut *gathered) {
         let Some(region) = region else { continue };
         let (total, discovered) = light_of_regions.entry(region).or_default();
@@ -41,7 +41,7 @@ pub(crate) fn learn(cache: &mut RadianceCache<'_>, texels: &[Texel], gathered: &
     }
     cache.discoveries.sort_by_key(|discovery| discovery.receiver);
     gathered.par_iter_mut().for_each(|sums| sums.unguided = UnguidedLight::default());
-    cache.guide = Cow::Owned(cache.exchange.guide.with(&cache.discoveries));
+    cache.guide = Arc::new(cache.exchange.guide.with(&cache.discoveries));
 }
 
 /// Whether one of a texel's samples outweighs the others, and the guide would hardly have led to it.
@@ -51,7 +51,7 @@ fn has_discovery(sums: &GatherSums) -> bool {
 }
 
 /// The region of the guide in which the middle of a texel lies.
-fn region_of(cache: &RadianceCache<'_>, texel: &Texel) -> Option<Region> {
+fn region_of(cache: &RadianceCache<'_>, texel: &Texel) -> Option<RegionIndex> {
     if texel.is_hidden() {
         return None;
     }

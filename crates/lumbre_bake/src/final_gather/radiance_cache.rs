@@ -1,17 +1,18 @@
 //! The light that leaves surfaces, for the gather's rays to read: direct light by texel, light by bounces by patch or,
 //! once a round has gathered it, by texel. Not the rays: they are `gather`'s and `incident`'s.
 
-use std::borrow::Cow;
+use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::steep_light::steep_texels;
 use super::texel_radiance::{TexelRadiances, mean_reflectances};
-use crate::coverage::CoveredTexels;
+use crate::coverage::{CoveredTexels, FootprintPoint, receiver};
 use crate::denoise::REPLICATES;
 use crate::direct_light::DirectLight;
 use crate::monitor::BakeMonitor;
 use crate::radiosity::{Discovery, Exchange, SamplingGuide};
+use crate::sampling::Sequence;
 use crate::scene::{BakeScene, LightmapLayout, Side};
 use crate::sources::Sources;
 use crate::texel_index::MapTexel;
@@ -23,13 +24,13 @@ pub(crate) struct RadianceCache<'a> {
     pub sources: &'a Sources<'a>,
     pub layout: &'a LightmapLayout,
     /// The light of patches, for points whose texel has none.
-    pub exchange: &'a Exchange,
+    pub exchange: Exchange,
     /// The light and the reflectance of texels.
     pub texels: TexelRadiances,
     /// Radius on a surface within which the errors that rounds leave in texels are correlated, canonical units.
     pub correlation_radius: f32,
     /// Which regions the light of each region comes from: as the patches know it, and with all `discoveries`.
-    pub guide: Cow<'a, SamplingGuide>,
+    pub guide: Arc<SamplingGuide>,
     /// What the rounds have found so far that the patches' guide had missed.
     pub discoveries: Vec<Discovery>,
     /// Samples of each replicate in the first round.
@@ -40,13 +41,16 @@ pub(crate) struct RadianceCache<'a> {
 /// of the demo level, 5.4 after the second.
 const CORRELATED_TEXELS: f32 = 4.5;
 
+/// Shadow rays to each lamp from a point whose texel's direct light is steep.
+const STEEP_LIGHT_SAMPLES: u32 = 1;
+
 impl<'a> RadianceCache<'a> {
     /// The cache before the first round: direct light of texels, light by bounces of patches.
     pub fn new(
         sources: &'a Sources<'a>,
         texels: &CoveredTexels<'a>,
         direct: &DirectLight,
-        exchange: &'a Exchange,
+        exchange: Exchange,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
@@ -64,8 +68,8 @@ impl<'a> RadianceCache<'a> {
             scene,
             sources,
             layout: texels.layout,
+            guide: Arc::clone(&exchange.guide),
             exchange,
-            guide: Cow::Borrowed(&exchange.guide),
             discoveries: Vec::new(),
             first_round_samples: effort.gather[0] / REPLICATES as u32,
         })
@@ -83,6 +87,15 @@ impl RadianceCache<'_> {
         let direct = texel.direct().unwrap_or_else(|| self.exchange.direct[patch.place()]);
         let irradiance = direct + indirect;
         self.reflectance_at(triangle, side, at) * irradiance
+    }
+
+    /// The direct irradiance (mixed lights included) at a point of a front, W/m², and the rays that it took: where that
+    /// of the texel is steep.
+    pub(crate) fn direct_light_at(&self, triangle: u32, at: (f32, f32), sequence: Sequence) -> (Vec3, u32) {
+        let point = FootprintPoint { triangle, at, offset: Vec2::ZERO };
+        let receiver = receiver(self.scene, &point);
+        let direct = self.sources.irradiance(sequence, STEEP_LIGHT_SAMPLES, &|_, _| Some(receiver));
+        (direct.total(), direct.rays)
     }
 
     /// The reflectance at a point of a surface.

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::map_error::MapError;
 use crate::direct_light::LocalLight;
+use crate::direct_light::views::SharesLeft;
 use crate::sample_allocation::WeightedGoal;
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
@@ -85,8 +86,8 @@ impl<'a> ErrorLeft<'a> {
     fn goal_with(&self, of_blocks: &[f64], aim: f64, open: &[CoveredTexel]) -> WeightedGoal {
         let [whole, whole_reducible] = self.whole;
         let of_whole = share_left(whole, whole_reducible, aim * open.len() as f64);
-        let shares =
-            self.local.views.shares(of_blocks, of_whole, MAX_REDUCTION.recip(), &self.reducible.expected);
+        let left = SharesLeft { of_blocks, of_whole, least: MAX_REDUCTION.recip() };
+        let shares = self.local.views.shares(&left, &self.reducible.expected);
         WeightedGoal::new(&self.reducible.cautious, &shares, open, CONVERGENCE_ORDER)
     }
 }

@@ -342,7 +342,7 @@ impl<'a> RoundPlanner<'a> {
         let missed = if is_whole_reached { error.in_worst_view } else { error.relative };
         let requested_over_left = requested / missed.powi(2).max(f64::MIN_POSITIVE);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP;
-        let (target, budget) = match is_small_step {
+        let (first_target, budget) = match is_small_step {
             true => {
                 let raised_limit = limit.max((of_quality as f64 * SMALL_STEP_RAYS) as u64);
                 (SMALL_STEP_TARGET * requested_over_left, raised_limit.saturating_sub(cast))
@@ -357,7 +357,7 @@ impl<'a> RoundPlanner<'a> {
             (allocator.added(&wanted), wanted)
         };
         let worthwhile = (WORTHWHILE * cast as f64) as u64;
-        let mut target = target;
+        let mut target = first_target;
         let (goal, (mut added, mut wanted)) = loop {
             // The mean over the level comes first: the rays may not suffice for every room.
             let goal = match is_whole_reached {

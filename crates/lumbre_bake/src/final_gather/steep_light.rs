@@ -1,15 +1,12 @@
-//! Direct light at the points that rays hit, where one value for the whole texel would not do: in texels over which
-//! direct light changes much, such as those around a lamp that hangs just below the ceiling. Of such a texel, rays from
-//! the room may reach only the dark part. Direct light elsewhere is read from texels: that is `radiance_cache`.
+//! The texels whose direct light must be found at the very points that rays hit, as one value for the whole texel would
+//! not do: those over which direct light changes much, such as around a lamp that hangs just below the ceiling. Of such
+//! a texel, rays from the room may reach only the dark part. Light is read in `radiance_cache`.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
-use super::incident::Hit;
-use super::radiance_cache::RadianceCache;
 use crate::color::channel_mean;
-use crate::coverage::{CoveredTexels, FootprintPoint, receiver};
+use crate::coverage::CoveredTexels;
 use crate::direct_light::LocalLight;
-use crate::sampling::Sequence;
 use crate::texel_index::MapTexel;
 
 /// A texel's direct light is steep if that of the texels around it differs by more than this share of the brightest.
@@ -17,14 +14,12 @@ const STEEP: f32 = 0.5;
 /// It matters only if the brightest of them has this many times the light around the texel: the edge of a shadow is
 /// steep too, but rays reach both of its sides.
 const MIN_LIGHT: f64 = 2.0;
-/// Shadow rays to each lamp at a hit.
-const SAMPLES: u32 = 1;
 
 /// Which texels of all maps have steep direct light. `direct` is per texel of all maps, NaN where it is not known.
 pub(crate) fn steep_texels(texels: &CoveredTexels<'_>, direct: &[Vec3], local: &LocalLight) -> Vec<bool> {
     let mut steep = vec![false; direct.len()];
     for (covered, texel) in texels.open() {
-        let map = &texels.layout.maps[texel.object as usize];
+        let map = &texels.layout.maps[texel.map.place()];
         let light = |near: MapTexel| channel_mean(direct[near.place()]);
         let around = map.neighbourhood(texel.x, texel.y, 1).map(light).filter(|light| light.is_finite());
         let (least, most) =
@@ -33,14 +28,4 @@ pub(crate) fn steep_texels(texels: &CoveredTexels<'_>, direct: &[Vec3], local: &
             most - least > STEEP * most && f64::from(most) > MIN_LIGHT * local.at(covered);
     }
     steep
-}
-
-impl RadianceCache<'_> {
-    /// The direct irradiance (mixed lights included) at the point that a ray has hit, W/m², and the rays that it took.
-    pub(crate) fn direct_light_at(&self, hit: &Hit, sequence: Sequence) -> (Vec3, u32) {
-        let point = FootprintPoint { triangle: hit.triangle, at: hit.at, offset: Vec2::ZERO };
-        let receiver = receiver(self.scene, &point);
-        let direct = self.sources.irradiance(sequence, SAMPLES, &|_, _| Some(receiver));
-        (direct.total(), direct.rays)
-    }
 }

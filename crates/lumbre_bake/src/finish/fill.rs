@@ -3,7 +3,7 @@
 //! continue the chart, so that bilinear filtering is right up to its border. Charts never mix: a texel takes values
 //! from one chart only. Not the closing of seams: that is `seams`.
 
-use glam::{DMat2, DVec2, Vec2, Vec3};
+use glam::{DMat2, DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::bounds::Bounds;
@@ -109,10 +109,8 @@ fn nearest_chart(map: &MapLayout, known: &[Option<TexelValue>], x: u32, y: u32) 
     best.map(|(_, chart)| chart)
 }
 
-/// The value at a texel's centre by a plane through the texels of a chart around it, fitted by weighted least squares
-/// and clamped to their range and a little more; and its squared error. For that the neighbours' errors are taken as
-/// independent or as all the same, whichever gives more, since smoothed texels are in between. With `is_beside` the
-/// texel's own value takes part, and of the others those at whose places it is true.
+/// The value at a texel's centre by a plane through the texels of a chart around it, and its squared error. With
+/// `is_beside` the texel's own value takes part, and of the others those at whose places it is true.
 fn extrapolate(
     map: &MapLayout,
     known: &[Option<TexelValue>],
@@ -121,15 +119,7 @@ fn extrapolate(
     is_beside: Option<&dyn Fn(Vec2) -> bool>,
 ) -> Option<(Vec3, f32)> {
     let center = Vec2::new(x as f32, y as f32) + 0.5;
-    let mut moments = [0.0f64; 6];
-    let mut sums = [glam::DVec3::ZERO; 3];
-    // Ranges of the values of the nine nearest texels, and of those one texel further out.
-    let mut ranges = [Bounds::<Vec3>::default(); 2];
-    // Distance, value and squared error.
-    let mut nearest = (f32::INFINITY, Vec3::ZERO, 0.0);
-    // Weights, offsets from the centre, and squared errors.
-    let mut terms = [(0.0f64, DVec2::ZERO, 0.0f64); 25];
-    let mut count = 0;
+    let mut plane = PlaneFit::new();
     for (nx, ny) in map.around(x, y, 2) {
         let is_itself = nx == x && ny == y;
         if is_itself && is_beside.is_none() {
@@ -142,55 +132,115 @@ fn extrapolate(
         if !is_itself && is_beside.is_some_and(|is_beside| !is_beside(place)) {
             continue;
         }
-        let d = place - center;
-        let weight = f64::from((-0.7 * d.length_squared()).exp());
-        terms[count] = (weight, d.as_dvec2(), f64::from(other.variance));
-        count += 1;
-        let (dx, dy, value) = (f64::from(d.x), f64::from(d.y), other.value.as_dvec3());
-        for (moment, term) in moments.iter_mut().zip([1.0, dx, dy, dx * dx, dx * dy, dy * dy]) {
+        plane.add(place - center, &other, x.abs_diff(nx).max(y.abs_diff(ny)) <= 1);
+    }
+    plane.at_center()
+}
+
+/// A known texel in a fit.
+#[derive(Clone, Copy, Default)]
+struct FitTerm {
+    weight: f64,
+    /// From the centre, in texels.
+    offset: DVec2,
+    /// Squared error.
+    variance: f64,
+}
+
+/// A plane through the values of known texels around a centre, fitted by weighted least squares.
+struct PlaneFit {
+    /// Weighted sums of 1, x, y, x², x y and y² of the offsets, and of the values times 1, x and y.
+    moments: [f64; 6],
+    sums: [DVec3; 3],
+    /// Ranges of the values of the nine nearest texels, and of those one texel further out.
+    ranges: [Bounds<Vec3>; 2],
+    /// Distance, value and squared error.
+    nearest: (f32, Vec3, f32),
+    terms: [FitTerm; 25],
+    count: usize,
+}
+
+impl PlaneFit {
+    fn new() -> Self {
+        Self {
+            moments: [0.0; 6],
+            sums: [DVec3::ZERO; 3],
+            ranges: [Bounds::default(); 2],
+            nearest: (f32::INFINITY, Vec3::ZERO, 0.0),
+            terms: [FitTerm::default(); 25],
+            count: 0,
+        }
+    }
+
+    /// Adds a known texel at an offset from the centre.
+    fn add(&mut self, offset: Vec2, texel: &TexelValue, is_adjacent: bool) {
+        let weight = f64::from((-0.7 * offset.length_squared()).exp());
+        self.terms[self.count] =
+            FitTerm { weight, offset: offset.as_dvec2(), variance: f64::from(texel.variance) };
+        self.count += 1;
+        let (dx, dy, value) = (f64::from(offset.x), f64::from(offset.y), texel.value.as_dvec3());
+        for (moment, term) in self.moments.iter_mut().zip([1.0, dx, dy, dx * dx, dx * dy, dy * dy]) {
             *moment += weight * term;
         }
-        for (sum, term) in sums.iter_mut().zip([1.0, dx, dy]) {
+        for (sum, term) in self.sums.iter_mut().zip([1.0, dx, dy]) {
             *sum += value * (weight * term);
         }
-        ranges[usize::from(x.abs_diff(nx).max(y.abs_diff(ny)) > 1)].extend([other.value]);
-        if d.length() < nearest.0 {
-            nearest = (d.length(), other.value, other.variance);
+        self.ranges[usize::from(!is_adjacent)].extend([texel.value]);
+        if offset.length() < self.nearest.0 {
+            self.nearest = (offset.length(), texel.value, texel.variance);
         }
     }
-    if nearest.0 == f32::INFINITY {
-        return None;
+
+    /// The value at the centre, clamped to the range of the texels and a little more, and its squared error; those of
+    /// the nearest texel if they are not finite. `None` if no texel is known.
+    fn at_center(&self) -> Option<(Vec3, f32)> {
+        if self.nearest.0 == f32::INFINITY {
+            return None;
+        }
+        let [_, sx, sy, sxx, sxy, syy] = self.moments.map(|moment| moment / self.moments[0]);
+        // The plane is fitted about the mean position of the known texels, so that a row of texels gets no slope across
+        // itself.
+        let spread = DMat2::from_cols(
+            DVec2::new(sxx - sx * sx + RIDGE, sxy - sx * sy),
+            DVec2::new(sxy - sx * sy, syy - sy * sy + RIDGE),
+        );
+        let to_center = spread.inverse() * DVec2::new(-sx, -sy);
+        let [mean, with_x, with_y] = self.sums.map(|sum| sum / self.moments[0]);
+        let value =
+            (mean + (with_x - mean * sx) * to_center.x + (with_y - mean * sy) * to_center.y).as_vec3();
+        // The nearest texels alone give the range, if there are any: a shadow's edge two texels away must not reach
+        // this one.
+        let [near, far] = self.ranges;
+        let Bounds { low, high } = if near.low.x <= near.high.x { near } else { far };
+        let margin = (high - low) * 0.5;
+        let value = value.clamp((low - margin).max(Vec3::ZERO), high + margin);
+        let variance = self.variance(DVec2::new(sx, sy), to_center);
+        let (_, nearest_value, nearest_variance) = self.nearest;
+        Some(match value.is_finite() && variance.is_finite() {
+            true => (value, variance),
+            false => (nearest_value, nearest_variance),
+        })
     }
-    let [_, sx, sy, sxx, sxy, syy] = moments.map(|moment| moment / moments[0]);
-    // The plane is fitted about the mean position of the known texels, so that a row of texels gets no slope across
-    // itself.
-    let spread = DMat2::from_cols(
-        DVec2::new(sxx - sx * sx + RIDGE, sxy - sx * sy),
-        DVec2::new(sxy - sx * sy, syy - sy * sy + RIDGE),
-    );
-    let to_centre = spread.inverse() * DVec2::new(-sx, -sy);
-    let [mean, with_x, with_y] = sums.map(|sum| sum / moments[0]);
-    let value = (mean + (with_x - mean * sx) * to_centre.x + (with_y - mean * sy) * to_centre.y).as_vec3();
-    // The nearest texels alone give the range, if there are any: a shadow's edge two texels away must not reach this
-    // one.
-    let Bounds { low, high } = if ranges[0].low.x <= ranges[0].high.x { ranges[0] } else { ranges[1] };
-    let margin = (high - low) * 0.5;
-    let value = value.clamp((low - margin).max(Vec3::ZERO), high + margin);
-    let (mut independent, mut correlated) = (0.0, 0.0);
-    for (weight, d, variance) in &terms[..count] {
-        let share = weight / moments[0] * (1.0 + (*d - DVec2::new(sx, sy)).dot(to_centre));
-        independent += share * share * variance;
-        correlated += share * variance.sqrt();
+
+    /// The squared error at the centre. The texels' errors are taken as independent or as all the same, whichever gives
+    /// more, since smoothed texels are in between.
+    fn variance(&self, mean_offset: DVec2, to_center: DVec2) -> f32 {
+        let (mut independent, mut correlated) = (0.0, 0.0);
+        for FitTerm { weight, offset, variance } in &self.terms[..self.count] {
+            let share = weight / self.moments[0] * (1.0 + (*offset - mean_offset).dot(to_center));
+            independent += share * share * variance;
+            correlated += share * variance.sqrt();
+        }
+        independent.max(correlated * correlated) as f32
     }
-    let variance = independent.max(correlated * correlated) as f32;
-    Some(if value.is_finite() && variance.is_finite() { (value, variance) } else { (nearest.1, nearest.2) })
 }
 
 /// Fills all maps from values and squared errors per covered texel. Values are NaN where nothing is known; errors are
 /// NaN there, too, and wherever a texel shows no surface of its own.
 pub(crate) fn fill(
     texels: &CoveredTexels<'_>,
-    (values, variances): (&[Vec3], &[f32]),
+    values: &[Vec3],
+    variances: &[f32],
     rings: u32,
 ) -> (Vec<Vec3>, Vec<f32>) {
     let CoveredTexels { scene, layout, contacts, .. } = texels;
@@ -222,7 +272,7 @@ fn hidden(layout: &LightmapLayout, texels: &[Texel], reach: u32) -> Vec<Hidden> 
         hidden[texel.index.place()] = Hidden::Deep;
     }
     for texel in texels {
-        let map = &layout.maps[texel.object as usize];
+        let map = &layout.maps[texel.map.place()];
         for (x, y) in map.around(texel.x, texel.y, reach) {
             let other = &mut hidden[map.texel(x, y).place()];
             if *other == Hidden::Deep {

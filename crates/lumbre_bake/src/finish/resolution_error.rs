@@ -11,13 +11,12 @@ use crate::chunks::in_chunks;
 use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel, receiver};
 use crate::denoise::REPLICATES;
 use crate::final_gather::{GatherSums, RadianceCache};
-use crate::monitor::BakeMonitor;
+use crate::monitor::{BakeMonitor, Clock};
 use crate::report::{ResolutionReport, StageNotes};
-use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
+use crate::sampling::{Sequence, Stream, cosine_about, hash, interval_at, triangle_point};
 use crate::scene::{Receiver, SurfaceHit};
 use crate::sources::Sources;
-use crate::stage::Stage;
-use crate::texel_index::MapTexel;
+use crate::texel_index::{MapIndex, MapTexel};
 use crate::{BakeError, BakeOptions};
 
 /// The points get one part in this many of the bake's rays, and never fewer than take no noticeable time.
@@ -47,8 +46,16 @@ pub(crate) struct DensePoint {
     pub rays: u64,
 }
 
-/// The points that the finished map is compared with; none if the comparison is switched off, or the time is up.
-/// `cache` is `None` where nothing bounces; `rays` is how many rays the bake has cast so far.
+/// Why the error of the map's resolution is not measured; `None` if it is.
+pub(crate) fn why_left_out(options: &BakeOptions, clock: Clock) -> Option<&'static str> {
+    match options.resolution_error {
+        false => Some("switched off"),
+        true => clock.is_over().then_some("the time is up"),
+    }
+}
+
+/// The points that the finished map is compared with. `cache` is `None` where nothing bounces; `rays` is how many rays
+/// the bake has cast so far.
 pub(crate) fn dense_points(
     sources: &Sources<'_>,
     cache: Option<&RadianceCache<'_>>,
@@ -56,11 +63,6 @@ pub(crate) fn dense_points(
     options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(Vec<DensePoint>, StageNotes), BakeError> {
-    if !options.resolution_error || monitor.clock().is_over() {
-        let why = if options.resolution_error { "the time is up" } else { "switched off" };
-        return Ok((Vec::new(), StageNotes::of_skipped(format!("resolution error: {why}"))));
-    }
-    monitor.stage(Stage::Resolution)?;
     let baker = PointBaker { sources, cache };
     let points = baker.bake_points(rays, options, monitor)?;
     let notes = StageNotes::of_rays(points.iter().map(|point| point.rays).sum());
@@ -101,7 +103,9 @@ impl PointBaker<'_> {
         let points = in_chunks(count, monitor, |index| {
             let [choice, u, v, _] = sequence.point(index as u32, 0);
             let place = f64::from(choice) * area;
-            let triangle = ends.partition_point(|&end| end <= place).min(ends.len().saturating_sub(1));
+            let Some((triangle, ..)) = interval_at(&ends, |&end| end, place) else {
+                return DensePoint::default();
+            };
             self.bake_point(triangle as u32, triangle_point(u, v), index as u32, options.seed)
         })?;
         Ok(points)
@@ -124,10 +128,10 @@ impl PointBaker<'_> {
             point.rays += u64::from(light.rays);
         }
         let Some(cache) = self.cache else { return point };
-        // A texel of this one point, with an object number and a seed of its own, so that it shares its samples with no
+        // A texel of this one point, with a map and a seed of its own, so that it shares its samples with no
         // other.
         let footprint = Footprint::Points(vec![footprint]);
-        let texel = Texel { index: MapTexel(index), object: index, x: 0, y: 0, triangle, footprint };
+        let texel = Texel { index: MapTexel(index), map: MapIndex(index), x: 0, y: 0, triangle, footprint };
         let mut gathered = GatherSums::default();
         cache.gather(&texel, &mut gathered, GATHER_RAYS, hash(seed ^ Stream::ResolutionPoints.number()));
         let [a, b, c, d] = gathered.sums.map(|sum| sum / GATHER_RAYS as f32);
@@ -199,19 +203,14 @@ fn look_up(
     point: &DensePoint,
 ) -> Option<(Vec3, f32)> {
     let triangle = &texels.scene.triangles[point.triangle as usize];
-    let map = &texels.layout.maps[triangle.object as usize];
-    let at = triangle.place_on_map(point.at) - 0.5;
+    let map = &texels.layout.maps[triangle.map.place()];
+    let at = triangle.place_on_map(point.at);
     if !at.is_finite() {
         return None;
     }
-    let low = at.floor();
-    let fraction = at - low;
     let (mut light, mut variance) = (Vec3::ZERO, 0.0);
-    for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-        let weight = (1.0 - (fraction.x - dx).abs()) * (1.0 - (fraction.y - dy).abs());
-        let x = (low.x + dx).clamp(0.0, (map.width - 1) as f32) as u32;
-        let y = (low.y + dy).clamp(0.0, (map.height - 1) as f32) as u32;
-        let texel = map.texel(x, y).place();
+    for (texel, weight) in map.bilinear(at) {
+        let texel = texel.place();
         // Texels of which nothing is known are black in the map.
         light += weight * if filled[texel].is_finite() { filled[texel] } else { Vec3::ZERO };
         variance += weight * weight * if variances[texel].is_finite() { variances[texel] } else { 0.0 };

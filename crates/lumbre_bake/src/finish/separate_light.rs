@@ -3,9 +3,7 @@
 use glam::Vec3;
 
 use super::fill::fill;
-use crate::coverage::CoveredTexels;
-use crate::direct_light::DirectLight;
-use crate::final_gather::IndirectLight;
+use crate::final_gather::LitTexels;
 
 /// The two parts of the irradiance, per texel of all maps, W/m²; NaN where nothing is known.
 pub(crate) struct Separate {
@@ -16,19 +14,15 @@ pub(crate) struct Separate {
 /// Splits the finished light of all maps (filled, seams closed) in the proportion of the covered texels' direct light
 /// and light by bounces, channel by channel. So whatever finishing did to the whole it does to both parts: neither is
 /// negative, and they add up to the map.
-pub(crate) fn separate(
-    texels: &CoveredTexels<'_>,
-    (direct, bounced): (&DirectLight, &IndirectLight),
-    finished: &[Vec3],
-    rings: u32,
-) -> Separate {
+pub(crate) fn separate(lit: &LitTexels<'_>, finished: &[Vec3], rings: u32) -> Separate {
+    let LitTexels { texels, direct, indirect, .. } = *lit;
     // The errors that come out are not used.
     let no_errors = vec![0.0; texels.list.len()];
-    let filled = |light: &[Vec3]| fill(texels, (light, &no_errors), rings).0;
+    let filled = |light: &[Vec3]| fill(texels, light, &no_errors, rings).0;
     let direct: Vec<Vec3> = direct.texels.iter().map(|direct| direct.baked).collect();
-    let bounced = match bounced.light.is_empty() {
+    let bounced = match indirect.light.is_empty() {
         true => vec![Vec3::ZERO; texels.list.len()],
-        false => bounced.light.clone(),
+        false => indirect.light.clone(),
     };
     let (direct, bounced) = (filled(&direct), filled(&bounced));
     let split = |((&whole, &direct), &bounced): ((&Vec3, &Vec3), &Vec3)| {

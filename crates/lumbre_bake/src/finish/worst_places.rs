@@ -9,6 +9,7 @@ use crate::WorstPlace;
 use crate::bounds::Bounds;
 use crate::coverage::{Texel, receiver};
 use crate::scene::{BakeScene, SceneObject};
+use crate::texel_index::MapIndex;
 
 /// Side of the cubes into which the level is divided, as a share of its longest side.
 const CUBE_SIDE: f32 = 1.0 / 8.0;
@@ -24,7 +25,7 @@ struct CubeErrors {
     position: DVec3,
     squares: f64,
     /// The part of `squares` that belongs to each object.
-    object_squares: BTreeMap<u32, f64>,
+    object_squares: BTreeMap<MapIndex, f64>,
 }
 
 /// The places where the error is largest, the worst first. `squares` are the squared errors of the covered texels,
@@ -48,7 +49,7 @@ pub(crate) fn worst_places(
         place.texels += 1;
         place.position += position.as_dvec3();
         place.squares += f64::from(square);
-        *place.object_squares.entry(texel.object).or_default() += f64::from(square);
+        *place.object_squares.entry(texel.map).or_default() += f64::from(square);
         open += 1;
     }
     // The errors of single texels contain chance that cancels in the whole: they are scaled so that they add up to the
@@ -62,9 +63,10 @@ pub(crate) fn worst_places(
         if texels < MIN_TEXELS || error <= whole {
             return None;
         }
-        let mut worst_objects: Vec<(u32, f64)> = place.object_squares.into_iter().collect();
+        let mut worst_objects: Vec<(MapIndex, f64)> = place.object_squares.into_iter().collect();
         worst_objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let name = |&(object, _): &(u32, f64)| objects.get(object as usize).map(|object| object.name.clone());
+        let name =
+            |&(object, _): &(MapIndex, f64)| objects.get(object.place()).map(|object| object.name.clone());
         let objects = worst_objects.iter().take(MAX_OBJECTS).filter_map(name).collect();
         let center = scene.space.world((place.position / count).as_vec3()).to_array();
         Some(WorstPlace { center, error, texels, objects })

@@ -24,9 +24,8 @@ use crate::chunks::in_chunks_uncheckpointed;
 use crate::final_gather::RadianceCache;
 use crate::monitor::BakeMonitor;
 use crate::report::StageNotes;
-use crate::scene::{BakeScene, StaticScene};
+use crate::scene::StaticScene;
 use crate::sources::Sources;
-use crate::stage::Stage;
 use crate::{BakeError, BakeOptions, ProbeReport, Quality};
 
 /// An irradiance volume, and where it is.
@@ -36,37 +35,47 @@ pub(crate) struct PlacedVolume {
     pub report: ProbeReport,
 }
 
-/// Bakes the probes. `None` if none are wanted or there is no light for them; the notes then say why.
-pub(crate) fn bake(
+/// The emissive faces whose light probes hold, as sources: those that are not lit in real time. `has_bounces` says
+/// whether surfaces reflect light to the probes as well.
+///
+/// # Errors
+/// Why there are no probes.
+pub(crate) fn emitters_of_probes<'a>(
     input: &StaticScene,
-    scene: &BakeScene,
-    sources: &Sources<'_>,
-    cache: Option<&RadianceCache<'_>>,
+    sources: &Sources<'a>,
+    has_bounces: bool,
     options: &BakeOptions,
-    monitor: &mut BakeMonitor<'_>,
-) -> Result<(Option<PlacedVolume>, StageNotes), BakeError> {
-    if let Err(reason) = input.calls_for_probes(options) {
-        return Ok((None, StageNotes::of_skipped(format!("probes: {reason}"))));
-    }
+) -> Result<Sources<'a>, &'static str> {
+    input.calls_for_probes(options)?;
     // The scene's surfaces are the input's primitives, in the same order.
     let lights_frames: Vec<bool> = input.primitives().map(|primitive| primitive.lights_frames).collect();
     let is_lit_in_real_time = |triangle: u32| {
-        let surface = scene.triangles[triangle as usize].surface;
+        let surface = sources.scene.triangles[triangle as usize].surface;
         lights_frames.get(surface as usize).copied().unwrap_or(false)
     };
     let emitters = sources.only_emitters(|emitter| !is_lit_in_real_time(emitter.triangle));
-    if emitters.is_empty() && cache.is_none() {
-        let why = "probes: nothing bounces, and no face shines that is not lit in real time";
-        return Ok((None, StageNotes::of_skipped(why)));
+    match emitters.is_empty() && !has_bounces {
+        true => Err("nothing bounces, and no face shines that is not lit in real time"),
+        false => Ok(emitters),
     }
-    monitor.stage(Stage::Probes)?;
+}
+
+/// Bakes the probes, which get light from these `emitters` and by bounces from what is in the `cache`.
+pub(crate) fn bake(
+    input: &StaticScene,
+    emitters: &Sources<'_>,
+    cache: Option<&RadianceCache<'_>>,
+    options: &BakeOptions,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(PlacedVolume, StageNotes), BakeError> {
+    let scene = emitters.scene;
     let mut notes = StageNotes::default();
     let grid = Grid::new(scene, input.moving_points(), options.probe_spacing, &mut notes.warnings);
     let clock = monitor.clock();
     let probes: Vec<ProbeSample> = in_chunks_uncheckpointed(grid.count(), monitor, |index| {
         // The volume must be complete, so that the remaining probes are sampled roughly once the time is up.
         let quality = if clock.is_over() { Quality::Draft } else { options.quality };
-        let light = light::ProbeLight { scene, emitters: &emitters, cache, effort: effort(quality) };
+        let light = light::ProbeLight { scene, emitters, cache, effort: effort(quality) };
         light.at(grid.position(index), options.seed, index as u32)
     })?;
     notes.rays = probes.iter().map(|probe| probe.rays).sum::<u64>();
@@ -88,7 +97,7 @@ pub(crate) fn bake(
     }
     let inside = if valid.contains(&false) { valid.iter().map(|valid| !valid).collect() } else { Vec::new() };
     let volume = IrradianceVolume { resolution: grid.resolution, cubes, inside };
-    Ok((Some(PlacedVolume { volume, grid, report }), notes))
+    Ok((PlacedVolume { volume, grid, report }, notes))
 }
 
 /// Numbers of a probe's samples.

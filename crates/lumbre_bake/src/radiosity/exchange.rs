@@ -1,25 +1,24 @@
-//! The exchange of light between patches: divides the scene into patches, samples their form factors, finds their
-//! direct light and solves the radiosity system of each channel. The light of texels is gathered from that in
-//! `final_gather`.
+//! The exchange of light between patches: starts with their direct light and solves the radiosity system of each
+//! channel. Patches and form factors are found in `transport`; the light of texels is gathered in `final_gather`.
+
+use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::form_factors::FormFactors;
-use super::patch_index::PatchIndex;
+use super::patch_light::direct_halves;
 use super::patches::{Patch, Patches};
 use super::sampling_guide::SamplingGuide;
-use super::size_error::size_error;
-use super::solution::gather;
-use crate::chunks::in_chunks;
+use super::size_error::{MeanSystem, size_error};
+use super::solution::{TOLERANCE, gather};
+use super::transport::Transport;
 use crate::color::wide_channel_mean;
 use crate::monitor::BakeMonitor;
 use crate::options::Solver;
 use crate::report::StageNotes;
-use crate::sampling::{Sequence, Stream, triangle_point};
-use crate::scene::{BakeScene, Receiver, Side};
+use crate::scene::BakeScene;
 use crate::sources::Sources;
-use crate::stage::Stage;
 use crate::{BakeError, BakeOptions};
 
 /// The light of all patches, which the final gather reads.
@@ -35,7 +34,7 @@ pub(crate) struct Exchange {
     /// Per patch, the distance below which it is too coarse to be read, canonical units.
     pub min_read_distance: Vec<f32>,
     /// Where each patch's light by bounces comes from.
-    pub guide: SamplingGuide,
+    pub guide: Arc<SamplingGuide>,
     /// Light that leaves each patch, without its emission, W/m².
     pub exitance: Vec<Vec3>,
     /// Bound of the solver's error, relative to the light by bounces.
@@ -53,60 +52,27 @@ pub(crate) struct ExchangeReport {
     pub residual_bound: f64,
 }
 
-/// How finely the exchange of light is computed.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Resolution {
-    /// Side of a patch, canonical units.
-    pub patch_side: f32,
-    /// Rays for all form factors together.
-    pub form_factor_rays: usize,
-    /// Upper estimate of the bytes that the bake then needs.
-    pub memory_bytes: u64,
-}
-
-/// Relative residual at which the solver stops: well below the error of the form factors.
-const TOLERANCE: f64 = 1e-5;
-
-/// Shadow rays from a patch to each source, for each of two halves.
-const SHADOW_RAYS: u32 = 8;
-
-/// The exchange with the form factors, if anything bounces; its figures; and notes.
+/// The exchange with its form factors, if anything bounces; its figures; and notes.
 type ExchangeResult = ((Option<(Exchange, FormFactors)>, ExchangeReport), StageNotes);
 
 impl Exchange {
-    /// Returns the form factors as well, by which `rebake` estimates what changes since a former bake do to the light.
-    /// `None` where nothing bounces; the notes then say why. `known_direct` returns each patch's direct irradiance by
-    /// two independent halves of samples, or `None` for patches of which it is not known: those cast shadow rays.
+    /// Finds the light of all patches. Returns the form factors as well, by which `rebake` estimates what changes since
+    /// a former bake do to the light. `None` where no light reaches a surface that reflects; the notes then say so.
+    /// `known_direct` is the direct irradiance of each patch by two independent halves of samples, or `None` for
+    /// patches of which it is not known: those cast shadow rays.
     pub fn new(
         sources: &Sources<'_>,
+        transport: Transport,
+        known_direct: &[Option<[Vec3; 2]>],
         options: &BakeOptions,
-        resolution: Resolution,
-        known_direct: impl FnOnce(&Patches) -> Vec<Option<[Vec3; 2]>>,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<ExchangeResult, BakeError> {
-        let (scene, mut report, mut notes) =
-            (sources.scene, ExchangeReport::default(), StageNotes::default());
-        let side = resolution.patch_side;
-        monitor.stage(Stage::FormFactors)?;
-        let patches = monitor.run_interruptible(0.0, || Patches::new(scene, side))?;
-        report.patches = patches.list.len();
-        notes.warnings.extend(patches.warnings.iter().cloned());
-        if patches.list.iter().all(|patch| patch.reflectance == Vec3::ZERO) {
-            notes.skipped.push(why_black_scene_is_skipped(sources).into());
-            let black = || sources.has_sky().then(|| Self::black(scene, patches, side));
-            return Ok(((monitor.run_interruptible(0.5, black)?, report), notes));
-        }
-        let (method, rays) = (options.form_factors, resolution.form_factor_rays);
-        let (factors, halves) = FormFactors::sample(scene, &patches, method, rays, options.seed, monitor)?;
-        notes.rays += factors.rays;
-        report.form_factors = factors.columns.len();
-        report.energy_lost = factors.energy_lost;
-
-        monitor.stage(Stage::Radiosity)?;
-        let known = monitor.run_interruptible(0.1, || known_direct(&patches))?;
+        let mut report = ExchangeReport::of(&transport);
+        let Transport { patches, side, factors, halves } = transport;
         let open = factors.open.as_slice();
-        let (direct_halves, rays) = direct_halves(sources, &patches, open, &known, options.seed, monitor)?;
-        notes.rays += rays;
+        let (direct_halves, rays) =
+            direct_halves(sources, &patches, open, known_direct, options.seed, monitor)?;
+        let mut notes = StageNotes::of_rays(rays);
         let [even, odd] = &direct_halves;
         let direct: Vec<Vec3> = even.iter().zip(odd).map(|(even, odd)| 0.5 * (*even + *odd)).collect();
         let is_dark = |(direct, patch): (&Vec3, &Patch)| *direct * patch.reflectance == Vec3::ZERO;
@@ -119,54 +85,75 @@ impl Exchange {
         let indirect = monitor.run_interruptible(0.5, || {
             solve(options.solver, &factors, &patches.list, &direct, &sky, &mut report)
         })?;
-        if report.residual > 2.0 * TOLERANCE {
-            notes.warnings.push(format!(
-                "the radiosity system was solved to a residual of {:.1e} only, after {} iterations; {TOLERANCE:.0e} was wanted",
-                report.residual,
-                report.iterations.into_iter().max().unwrap_or_default()
-            ));
-        }
+        notes.warnings.extend(report.unsolved());
         let noise = monitor.run_interruptible(0.6, || {
             let sky_halves = halves.each_ref().map(|factors| sky_irradiance(factors, sources));
             sampling_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list)
         })?;
         let by_size = monitor.run_interruptible(0.7, || {
-            let reflectance = mean_reflectances(&patches.list);
             let arriving = |(direct, sky): (&Vec3, &Vec3)| wide_channel_mean(*direct + *sky);
-            let first: Vec<f64> = direct.iter().zip(&sky).map(arriving).collect();
-            size_error(scene, &patches, side, &factors, (&reflectance, &first), (options.solver, TOLERANCE))
+            let first = direct.iter().zip(&sky).map(arriving).collect();
+            let system =
+                MeanSystem { solver: options.solver, reflectance: mean_reflectances(&patches.list), first };
+            size_error(sources.scene, &patches, side, &factors, &system)
         })?;
-        let indirect_error = noise.iter().zip(by_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
         let reflected =
             |(index, patch): (usize, &Patch)| patch.reflectance * (direct[index] + indirect[index]);
         let exitance: Vec<Vec3> = patches.list.iter().enumerate().map(reflected).collect();
         let guide = monitor.run_interruptible(0.8, || {
             let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
-            SamplingGuide::new(scene, &patches, side, &factors, &radiosity, &sky)
+            SamplingGuide::new(sources.scene, &patches, side, &factors, &radiosity, &sky)
         })?;
-        let min_read_distance = patches.min_read_distances(scene, side);
         let exchange = Self {
+            min_read_distance: patches.min_read_distances(sources.scene, side),
             patches,
             direct,
             indirect,
-            indirect_error,
-            min_read_distance,
-            guide,
+            indirect_error: noise.iter().zip(by_size).map(|(&noise, size)| Vec2::new(noise, size)).collect(),
+            guide: Arc::new(guide),
             exitance,
             residual_bound: report.residual_bound,
         };
         Ok(((Some((exchange, factors)), report), notes))
     }
-}
 
-impl Exchange {
+    /// Of a scene whose surfaces reflect nothing: `None` without a sky, which is then all that the gather could find.
+    pub fn black(sources: &Sources<'_>, transport: Transport) -> ExchangeResult {
+        let (report, has_sky) = (ExchangeReport::of(&transport), sources.has_sky());
+        let why = match has_sky {
+            true => {
+                "form factors and radiosity: no surface reflects (rho = 0); the final gather finds the sky"
+            }
+            false => "form factors, radiosity and final gather: no surface reflects (rho = 0)",
+        };
+        let notes = StageNotes::of_skipped(why);
+        if !has_sky {
+            return ((None, report), notes);
+        }
+        let Transport { patches, side, factors, .. } = transport;
+        let count = patches.list.len();
+        let dark = vec![Vec3::ZERO; count];
+        let guide = SamplingGuide::new(sources.scene, &patches, side, &factors, &vec![0.0; count], &dark);
+        let exchange = Self {
+            direct: dark.clone(),
+            indirect: dark.clone(),
+            indirect_error: vec![Vec2::ZERO; count],
+            min_read_distance: patches.min_read_distances(sources.scene, side),
+            patches,
+            guide: Arc::new(guide),
+            exitance: dark,
+            residual_bound: 0.0,
+        };
+        ((Some((exchange, factors)), report), notes)
+    }
+
     /// Light that leaves each object, without its emission, W/m²: the least and the most of its patches, by channel.
     /// Backs that receive no light count as black.
     pub fn exitance_of(&self, scene: &BakeScene, objects: usize) -> Vec<[Vec3; 2]> {
         let mut ranges = vec![[Vec3::INFINITY, Vec3::ZERO]; objects];
         for (patch, exitance) in self.patches.list.iter().zip(&self.exitance) {
             let triangle = &scene.triangles[patch.triangle as usize];
-            let [least, most] = &mut ranges[triangle.object as usize];
+            let [least, most] = &mut ranges[triangle.map.place()];
             let has_black_back = !triangle.closed && !triangle.two_sided;
             *least = least.min(if has_black_back { Vec3::ZERO } else { *exitance });
             *most = most.max(*exitance);
@@ -175,89 +162,29 @@ impl Exchange {
         let range = |[least, most]: [Vec3; 2]| [if least.is_finite() { least } else { Vec3::ZERO }, most];
         ranges.into_iter().map(range).collect()
     }
-
-    /// Of a scene whose surfaces reflect nothing.
-    fn black(scene: &BakeScene, patches: Patches, side: f32) -> (Self, FormFactors) {
-        let count = patches.list.len();
-        let dark = vec![Vec3::ZERO; count];
-        let factors = FormFactors::none(&patches);
-        let guide = SamplingGuide::new(scene, &patches, side, &factors, &vec![0.0; count], &dark);
-        let exchange = Self {
-            direct: dark.clone(),
-            indirect: dark.clone(),
-            indirect_error: vec![Vec2::ZERO; count],
-            min_read_distance: patches.min_read_distances(scene, side),
-            patches,
-            guide,
-            exitance: dark,
-            residual_bound: 0.0,
-        };
-        (exchange, factors)
-    }
 }
 
-/// For the report, where no surface reflects.
-fn why_black_scene_is_skipped(sources: &Sources<'_>) -> &'static str {
-    match sources.has_sky() {
-        true => "form factors and radiosity: no surface reflects (rho = 0); the final gather finds the sky",
-        false => "form factors, radiosity and final gather: no surface reflects (rho = 0)",
+impl ExchangeReport {
+    /// Before the radiosity system is solved.
+    fn of(transport: &Transport) -> Self {
+        Self {
+            patches: transport.patches.list.len(),
+            form_factors: transport.factors.columns.len(),
+            energy_lost: transport.factors.energy_lost,
+            ..Self::default()
+        }
     }
-}
 
-/// Direct irradiance of each patch by two independent halves of samples, and the rays that it took. `open` is the share
-/// of each patch that is not inside other geometry; patches whose light is `known` cast no rays.
-fn direct_halves(
-    sources: &Sources<'_>,
-    patches: &Patches,
-    open: &[f32],
-    known: &[Option<[Vec3; 2]>],
-    seed: u32,
-    monitor: &mut BakeMonitor<'_>,
-) -> Result<([Vec<Vec3>; 2], u64), BakeError> {
-    let mut halves = [Vec::new(), Vec::new()];
-    let mut rays = 0;
-    for (number, half) in (0..).zip(&mut halves) {
-        let results: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), monitor, |place| {
-            match known.get(place) {
-                Some(Some(halves)) if open[place] > 0.0 => return (halves[number as usize], 0),
-                _ => {}
-            }
-            let index = PatchIndex::new(place);
-            let sequence = Sequence::new(seed, Stream::PatchLight(number), index.0);
-            patch_direct(sources, patches, index, open[place], sequence)
-        })?;
-        rays += results.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
-        *half = results.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
+    /// A warning if the solver has ended too early.
+    fn unsolved(&self) -> Option<String> {
+        (self.residual > 2.0 * TOLERANCE).then(|| {
+            format!(
+                "the radiosity system was solved to a residual of {:.1e} only, after {} iterations; {TOLERANCE:.0e} was wanted",
+                self.residual,
+                self.iterations.into_iter().max().unwrap_or_default()
+            )
+        })
     }
-    Ok((halves, rays))
-}
-
-/// Direct irradiance of a patch, and the rays that it took. `open` is the share of the patch that is not inside other
-/// geometry: the part inside receives nothing, so that the mean over the whole patch is divided by that share.
-pub(crate) fn patch_direct(
-    sources: &Sources<'_>,
-    patches: &Patches,
-    index: PatchIndex,
-    open: f32,
-    sequence: Sequence,
-) -> (Vec3, u32) {
-    let (scene, patch) = (sources.scene, &patches.list[index.place()]);
-    // The light on a patch that reflects nothing, usually a lamp's, is not needed.
-    if open <= 0.0 || patch.reflectance == Vec3::ZERO {
-        return (Vec3::ZERO, 0);
-    }
-    let triangle = &scene.triangles[patch.triangle as usize];
-    let point = |x: f32, y: f32| {
-        let (u, v) = patches.point(patch, triangle_point(x, y));
-        let normal = triangle.side_normal(patch.side);
-        let position = triangle.position(u, v);
-        let origin = scene.off_surface(patch.triangle, patch.side, position);
-        let shading = triangle.shading_normal(u, v);
-        let shading = if patch.side == Side::Front { shading } else { -shading };
-        Some(Receiver { position, origin, geometric_normal: normal, normal: shading })
-    };
-    let direct = sources.irradiance(sequence, SHADOW_RAYS, &point);
-    (direct.total() / open, direct.rays)
 }
 
 /// Reflectance of each patch, mean of the channels.

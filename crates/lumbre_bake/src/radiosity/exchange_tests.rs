@@ -7,8 +7,8 @@ use std::path::Path;
 use bevy_ecs::world::World;
 use glam::Vec3;
 
-use super::exchange::{Exchange, ExchangeReport, Resolution};
-use super::patches::Patches;
+use super::exchange::{Exchange, ExchangeReport};
+use super::transport::{PatchResolution, Transport};
 use crate::monitor::BakeMonitor;
 use crate::options::Solver;
 use crate::scene::from_world;
@@ -45,11 +45,13 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, ExchangeReport) {
     let mut carry_on = |_| ControlFlow::Continue(());
     let mut monitor = BakeMonitor::new(&mut carry_on, None);
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
-    let resolution =
-        Resolution { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000, memory_bytes: 0 };
-    let none_known = |_: &Patches| Vec::new();
-    let ((exchange, report), _) =
-        Exchange::new(&sources, &options, resolution, none_known, &mut monitor).unwrap();
+    let resolution = PatchResolution {
+        patch_side: (2.0 * area / 2000.0).sqrt(),
+        form_factor_rays: 200_000,
+        memory_bytes: 0,
+    };
+    let (transport, _) = Transport::new(&scene, &resolution, &options, &mut monitor).unwrap();
+    let ((exchange, report), _) = Exchange::new(&sources, transport, &[], &options, &mut monitor).unwrap();
     (exchange.expect("light bounces").0.indirect, report)
 }
 

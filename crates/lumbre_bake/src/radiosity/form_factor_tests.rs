@@ -52,7 +52,7 @@ fn factor(objects: &[&[[Vec3; 3]]], side: f32, method: FormFactorMethod) -> (f64
     let mut carry_on = carry_on;
     let monitor = &mut BakeMonitor::new(&mut carry_on, None);
     let (factors, _) = FormFactors::sample(&scene, &patches, method, 200_000, 7, monitor).unwrap();
-    let object = |patch: PatchIndex| scene.triangles[patches.list[patch.place()].triangle as usize].object;
+    let object = |patch: PatchIndex| scene.triangles[patches.list[patch.place()].triangle as usize].map.0;
     let (mut exchange, mut area) = (0.0, 0.0);
     for i in PatchIndex::all(factors.len()).filter(|&i| object(i) == 0) {
         area += f64::from(factors.areas[i.place()]);

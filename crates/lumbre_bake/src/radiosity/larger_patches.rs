@@ -4,16 +4,16 @@
 use rayon::prelude::*;
 
 use super::form_factors::FormFactors;
-use super::patch_index::PatchIndex;
+use super::patch_index::{PatchIndex, RegionIndex};
 use super::patches::Patches;
 use crate::scene::BakeScene;
 
-/// The larger patches, and the smaller ones that each contains.
+/// The larger patches, which are regions of the smaller ones.
 pub(crate) struct LargerPatches {
     pub patches: Patches,
-    /// For each smaller patch, the larger one in which its centroid lies.
-    pub of: Vec<PatchIndex>,
-    /// For each larger patch, the smaller ones that it contains, ascending.
+    /// For each smaller patch, the region in which its centroid lies.
+    pub of: Vec<RegionIndex>,
+    /// For each region, the smaller patches that it contains, ascending.
     pub members: Vec<Vec<PatchIndex>>,
 }
 
@@ -26,23 +26,25 @@ impl LargerPatches {
         }
         let containing = |patch| {
             let centroid = smaller.point(patch, (1.0 / 3.0, 1.0 / 3.0));
-            patches.at(patch.triangle, patch.side, centroid).unwrap_or(PatchIndex(0))
+            patches
+                .at(patch.triangle, patch.side, centroid)
+                .map_or(RegionIndex(0), |larger| RegionIndex(larger.0))
         };
-        let of: Vec<PatchIndex> = smaller.list.iter().map(containing).collect();
+        let of: Vec<RegionIndex> = smaller.list.iter().map(containing).collect();
         let mut members = vec![Vec::new(); patches.list.len()];
-        for (patch, larger) in PatchIndex::all(of.len()).zip(&of) {
-            members[larger.place()].push(patch);
+        for (patch, region) in PatchIndex::all(of.len()).zip(&of) {
+            members[region.place()].push(patch);
         }
         Some(Self { patches, of, members })
     }
 
-    /// Calls `row` for each larger patch with its members and its row of exchange areas, ascending, and returns the
-    /// results. An exchange area of two larger patches is the sum over all pairs of their members, from the smaller
+    /// Calls `row` for each region with its members and its row of exchange areas, ascending, and returns the
+    /// results. An exchange area of two regions is the sum over all pairs of their members, from the smaller
     /// patches' `factors`.
     pub fn rows<T: Send>(
         &self,
         factors: &FormFactors,
-        row: impl Fn(&[PatchIndex], Vec<(PatchIndex, f64)>) -> T + Sync,
+        row: impl Fn(&[PatchIndex], Vec<(RegionIndex, f64)>) -> T + Sync,
     ) -> Vec<T> {
         // `exchange` is a dense row of sums, all 0 between calls.
         let row_of = |exchange: &mut Vec<f64>, members: &Vec<PatchIndex>| {
@@ -51,15 +53,15 @@ impl LargerPatches {
                 if factors.stop.is_cancelled() {
                     break;
                 }
-                let larger = self.of[other.place()];
-                let sum = &mut exchange[larger.place()];
+                let region = self.of[other.place()];
+                let sum = &mut exchange[region.place()];
                 if *sum == 0.0 && g > 0.0 {
-                    columns.push(larger);
+                    columns.push(region);
                 }
                 *sum += g;
             }
             columns.sort_unstable();
-            let sum = |larger: PatchIndex| (larger, std::mem::take(&mut exchange[larger.place()]));
+            let sum = |region: RegionIndex| (region, std::mem::take(&mut exchange[region.place()]));
             row(members, columns.into_iter().map(sum).collect())
         };
         let zeros = || vec![0.0f64; self.members.len()];

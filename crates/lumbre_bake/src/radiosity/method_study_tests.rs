@@ -8,10 +8,11 @@ use std::time::Instant;
 use bevy_ecs::world::World;
 use glam::Vec3;
 
-use super::exchange::{mean_reflectances, patch_direct};
+use super::exchange::mean_reflectances;
 use super::exchange_tests::{MODELS, model};
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
+use super::patch_light::patch_direct;
 use super::patches::Patches;
 use super::solution::gather;
 use crate::color::wide_channel_mean;

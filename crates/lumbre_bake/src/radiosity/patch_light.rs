@@ -1,17 +1,25 @@
 //! Direct light of patches as the mean of the direct light of the texels on them, which is known already, and more
-//! accurately than from a few shadow rays of the patch. Patches with too few texels cast shadow rays instead, in
-//! `exchange`.
+//! accurately than from a few shadow rays of the patch. Patches with too few texels cast shadow rays instead.
 
 use glam::{DVec3, Vec2, Vec3};
 
+use super::patch_index::PatchIndex;
 use super::patches::Patches;
+use crate::BakeError;
+use crate::chunks::in_chunks;
 use crate::coverage::{CoveredTexels, Footprint, Texel, barycentric};
 use crate::direct_light::DirectLight;
-use crate::scene::{BakeScene, Side};
+use crate::monitor::BakeMonitor;
+use crate::sampling::{Sequence, Stream, triangle_point};
+use crate::scene::{BakeScene, Receiver, Side};
+use crate::sources::Sources;
 
 /// Fewest texels that a patch's light is computed from, in each half of them. The share of fewer texels that lies
 /// beyond the patch's border would be too large.
 const MIN_TEXELS: f64 = 2.0;
+
+/// Shadow rays from a patch to each source, for each of two halves.
+const SHADOW_RAYS: u32 = 8;
 
 /// Mean direct irradiance of each patch, mixed lights included, by two halves of its texels, the fields of a
 /// chessboard. `None` where there are too few texels. Texels that walls divide are left out, since they hold the light
@@ -63,6 +71,62 @@ fn for_each_point(scene: &BakeScene, texel: &Texel, mut visit: impl FnMut(u32, (
         }
         Footprint::Hidden => {}
     }
+}
+
+/// Direct irradiance of each patch by two independent halves of samples, and the rays that it took. `open` is the share
+/// of each patch that is not inside other geometry; patches whose light is `known` cast no rays.
+pub(super) fn direct_halves(
+    sources: &Sources<'_>,
+    patches: &Patches,
+    open: &[f32],
+    known: &[Option<[Vec3; 2]>],
+    seed: u32,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<([Vec<Vec3>; 2], u64), BakeError> {
+    let mut halves = [Vec::new(), Vec::new()];
+    let mut rays = 0;
+    for (number, half) in (0..).zip(&mut halves) {
+        let results: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), monitor, |place| {
+            match known.get(place) {
+                Some(Some(halves)) if open[place] > 0.0 => return (halves[number as usize], 0),
+                _ => {}
+            }
+            let index = PatchIndex::new(place);
+            let sequence = Sequence::new(seed, Stream::PatchLight(number), index.0);
+            patch_direct(sources, patches, index, open[place], sequence)
+        })?;
+        rays += results.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
+        *half = results.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
+    }
+    Ok((halves, rays))
+}
+
+/// Direct irradiance of a patch, and the rays that it took. `open` is the share of the patch that is not inside other
+/// geometry: the part inside receives nothing, so that the mean over the whole patch is divided by that share.
+pub(crate) fn patch_direct(
+    sources: &Sources<'_>,
+    patches: &Patches,
+    index: PatchIndex,
+    open: f32,
+    sequence: Sequence,
+) -> (Vec3, u32) {
+    let (scene, patch) = (sources.scene, &patches.list[index.place()]);
+    // The light on a patch that reflects nothing, usually a lamp's, is not needed.
+    if open <= 0.0 || patch.reflectance == Vec3::ZERO {
+        return (Vec3::ZERO, 0);
+    }
+    let triangle = &scene.triangles[patch.triangle as usize];
+    let point = |x: f32, y: f32| {
+        let (u, v) = patches.point(patch, triangle_point(x, y));
+        let normal = triangle.side_normal(patch.side);
+        let position = triangle.position(u, v);
+        let origin = scene.off_surface(patch.triangle, patch.side, position);
+        let shading = triangle.shading_normal(u, v);
+        let shading = if patch.side == Side::Front { shading } else { -shading };
+        Some(Receiver { position, origin, geometric_normal: normal, normal: shading })
+    };
+    let direct = sources.irradiance(sequence, SHADOW_RAYS, &point);
+    (direct.total() / open, direct.rays)
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use super::patch_index::PatchIndex;
 use super::triangle_cells::{CORNERS, TriangleCells, cell_at, point_in_row, row_of_cell};
 use crate::scene::mean_of_points::{SubTriangle, mean_of_points};
 use crate::scene::{BakeScene, SceneTriangle, ShownTexels, Side};
+use crate::texel_index::MapIndex;
 
 /// One side of one piece of a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +120,7 @@ impl Patches {
             warnings: Vec::new(),
         };
         // Per object, how many of its cells more lines cross than may cut them.
-        let mut full_cells: BTreeMap<u32, usize> = BTreeMap::new();
+        let mut full_cells: BTreeMap<MapIndex, usize> = BTreeMap::new();
         for (index, triangle) in scene.triangles.iter().enumerate() {
             if triangle.is_hidden_duplicate || scene.stop.is_cancelled() {
                 patches.triangles.push(TrianglePatches::NONE);
@@ -128,15 +129,15 @@ impl Patches {
             let full_before = patches.trees.full;
             let cells = TriangleCells::new(scene, index, side, &mut patches.trees);
             if patches.trees.full > full_before {
-                *full_cells.entry(triangle.object).or_default() += patches.trees.full - full_before;
+                *full_cells.entry(triangle.map).or_default() += patches.trees.full - full_before;
             }
             patches.push_triangle(scene, index, &cells);
         }
-        let warning = |(object, count): (u32, usize)| {
+        let warning = |(map, count): (MapIndex, usize)| {
             format!(
                 "{}: more surfaces stand on {count} of its cells than patches are cut along; light that bounces off there mixes between \
                  what they divide",
-                scene.names[object as usize]
+                scene.names[map.place()]
             )
         };
         patches.warnings = full_cells.into_iter().map(warning).collect();
@@ -213,11 +214,11 @@ impl Patches {
         };
         let results: Vec<(Vec3, Option<f32>)> = self.list.par_iter().map(of_patch).collect();
         // Per object with a patch that shows too many texels, the most texels along a patch's edge.
-        let mut most_texels: BTreeMap<u32, f32> = BTreeMap::new();
+        let mut most_texels: BTreeMap<MapIndex, f32> = BTreeMap::new();
         for (patch, (reflectance, texels)) in self.list.iter_mut().zip(results) {
             patch.reflectance = reflectance;
             if let Some(texels) = texels {
-                let most = most_texels.entry(scene.triangles[patch.triangle as usize].object).or_default();
+                let most = most_texels.entry(scene.triangles[patch.triangle as usize].map).or_default();
                 *most = most.max(texels);
             }
         }
@@ -228,11 +229,11 @@ impl Patches {
                 *sides = [reflectance(triangle.front), triangle.back.map_or(Vec3::ZERO, reflectance)];
             }
         }
-        self.warnings.extend(most_texels.into_iter().map(|(object, most)| {
+        self.warnings.extend(most_texels.into_iter().map(|(map, most)| {
             format!(
                 "{}: a patch of it shows up to {most:.0} texels of its textures along an edge; what bounces off it is the mean of \
                  {MAX_TEXTURE_POINTS} points along there, which may miss what is smaller",
-                scene.names[object as usize]
+                scene.names[map.place()]
             )
         }));
     }

@@ -11,20 +11,18 @@ use glam::Vec3;
 
 use super::form_factors::FormFactors;
 use super::larger_patches::LargerPatches;
-use super::patch_index::PatchIndex;
+use super::patch_index::{PatchIndex, RegionIndex};
 use super::patches::Patches;
+use super::sparse_distributions::{Entry, RowPart, SparseDistributions, cumulative};
 use super::unseen_regions::UnseenRegions;
+use crate::sampling::interval_at;
 use crate::scene::BakeScene;
-
-/// A region of the guide, by its place among all regions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Region(u32);
 
 /// For each region, the regions that light it by bounces, with probabilities in proportion to the irradiance that they
 /// contribute; and for each region its patches, with probabilities in proportion to the light that leaves them.
 #[derive(Clone, Debug)]
 pub(crate) struct SamplingGuide {
-    rows: Rows,
+    rows: SparseDistributions,
     /// The patches of all regions, one region after the other.
     members: Vec<Member>,
     /// Where each region's patches begin in that list, and at last the list's length.
@@ -38,7 +36,7 @@ pub(crate) struct SamplingGuide {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Discovery {
     /// The region that receives the light.
-    pub receiver: Region,
+    pub receiver: RegionIndex,
     /// Where it comes from.
     pub patch: PatchIndex,
     /// Its share of all light by bounces and by the sky that the region receives.
@@ -57,7 +55,7 @@ struct Member {
 /// canonical unit.
 #[derive(Clone, Copy, Debug)]
 struct PatchInRegion {
-    region: Region,
+    region: RegionIndex,
     density: f32,
 }
 
@@ -115,10 +113,10 @@ impl SamplingGuide {
             })
             .collect();
         let unseen = UnseenRegions::new(scene, &larger, REGION_SIDE * side, &radiosity_of_regions);
-        let share_and_row = |members: &[PatchIndex], exchange: Vec<(PatchIndex, f64)>| {
-            let mut flux: Vec<(u32, f64)> = exchange
+        let share_and_row = |members: &[PatchIndex], exchange: Vec<(RegionIndex, f64)>| {
+            let mut flux: Vec<(RegionIndex, f64)> = exchange
                 .iter()
-                .map(|(region, g)| (region.0, g * radiosity_of_regions[region.place()]))
+                .map(|&(region, g)| (region, g * radiosity_of_regions[region.place()]))
                 .collect();
             let by_bounces: f64 = flux.iter().map(|(_, flux)| flux).sum();
             let sky_flux = |member: &PatchIndex| {
@@ -133,20 +131,16 @@ impl SamplingGuide {
             if let Some(first) = members.first() {
                 unseen.add(larger.of[first.place()], &exchange, &mut flux);
             }
-            (share, cumulative(flux))
+            (share, cumulative(flux.into_iter().map(|(region, flux)| (region.0, flux)).collect()))
         };
         let distributions = larger.rows(factors, share_and_row);
-        let mut rows = Rows::new(distributions.len());
-        rows.entries.reserve_exact(distributions.iter().map(|(_, row)| row.len()).sum());
+        let entries = distributions.iter().map(|(_, row)| row.len()).sum();
+        let mut rows = SparseDistributions::new(distributions.len(), entries);
         distributions.into_iter().for_each(|(share, row)| rows.push(share, &row));
         let mut guide = Self {
             rows,
             members: Vec::with_capacity(patches.list.len()),
-            patches: larger
-                .of
-                .iter()
-                .map(|region| PatchInRegion { region: Region(region.0), density: 0.0 })
-                .collect(),
+            patches: larger.of.iter().map(|&region| PatchInRegion { region, density: 0.0 }).collect(),
             unseen,
             ..Self::empty()
         };
@@ -160,7 +154,7 @@ impl SamplingGuide {
     /// Knows nothing of any patch.
     fn empty() -> Self {
         Self {
-            rows: Rows::new(0),
+            rows: SparseDistributions::new(0, 0),
             members: Vec::new(),
             first_members: vec![0],
             patches: Vec::new(),
@@ -190,15 +184,12 @@ impl SamplingGuide {
     /// that it came from, the other half for all bright regions around that one. No row more than doubles, or gets more
     /// than [`MIN_NEW_ENTRIES`] if it was short, so that memory still follows from the rays of the form factors.
     pub fn with(&self, discoveries: &[Discovery]) -> Self {
-        let mut rows = Rows { part_bits: self.rows.part_bits, ..Rows::default() };
-        rows.entries.reserve(self.rows.entries.len());
+        let mut rows = SparseDistributions::like(&self.rows);
         let mut left = discoveries;
-        for number in 0..self.rows.heads.len() as u32 {
+        for (number, (share, known)) in (0..).zip(self.rows.rows()) {
             let discovered;
             (discovered, left) =
                 left.split_at(left.partition_point(|discovery| discovery.receiver.0 <= number));
-            let known = self.rows.entries_of(number);
-            let share = self.rows.heads[number as usize].share;
             let total = discovered.iter().map(|discovery| discovery.share).sum::<f64>();
             if total == 0.0 {
                 rows.push(share, known);
@@ -208,16 +199,16 @@ impl SamplingGuide {
                 true => (rounded_share(total.min(1.0)).max(1.0 / SHARE_STEPS), total),
                 false => (share, total.min(MAX_DISCOVERED)),
             };
-            let mut new: BTreeMap<u32, f64> = BTreeMap::new();
+            let mut new: BTreeMap<RegionIndex, f64> = BTreeMap::new();
             for (region, share) in discovered.iter().flat_map(|discovery| self.spread(discovery)) {
                 *new.entry(region).or_default() += share;
             }
-            let mut new: Vec<(u32, f64)> = new.into_iter().collect();
+            let mut new: Vec<(RegionIndex, f64)> = new.into_iter().collect();
             new.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
             new.truncate(known.len().max(MIN_NEW_ENTRIES));
             let total = new.iter().map(|(_, share)| share).sum::<f64>();
             let mut weights: BTreeMap<u32, f64> =
-                new.into_iter().map(|(region, share)| (region, weight * share / total)).collect();
+                new.into_iter().map(|(region, share)| (region.0, weight * share / total)).collect();
             let mut start = 0.0;
             for entry in known {
                 *weights.entry(entry.column).or_default() += (1.0 - weight) * f64::from(entry.end - start);
@@ -235,31 +226,31 @@ impl SamplingGuide {
     }
 
     /// The regions to which a discovery leads, with their parts of its share.
-    fn spread(&self, discovery: &Discovery) -> Vec<(u32, f64)> {
+    fn spread(&self, discovery: &Discovery) -> Vec<(RegionIndex, f64)> {
         let origin = self.patches[discovery.patch.place()].region;
-        let near = self.unseen.around(PatchIndex(discovery.receiver.0), PatchIndex(origin.0));
+        let near = self.unseen.around(discovery.receiver, origin);
         let power: f64 = near.iter().map(|(_, power)| power).sum();
         if power.is_nan() || power <= 0.0 {
-            return vec![(origin.0, discovery.share)];
+            return vec![(origin, discovery.share)];
         }
         let half = 0.5 * discovery.share;
-        let of_near = near.into_iter().map(|(region, near_power)| (region.0, half * near_power / power));
-        of_near.chain([(origin.0, half)]).collect()
+        let of_near = near.into_iter().map(|(region, near_power)| (region, half * near_power / power));
+        of_near.chain([(origin, half)]).collect()
     }
 
     /// The region of a patch; `None` if the guide knows nothing of it.
-    pub fn region_of(&self, patch: PatchIndex) -> Option<Region> {
+    pub fn region_of(&self, patch: PatchIndex) -> Option<RegionIndex> {
         self.patches.get(patch.place()).map(|patch| patch.region)
     }
 
     /// The share of the samples at a region that the guide places, in [0, 1); `None` if according to the solution no
     /// light arrives there by bounces.
-    pub fn share(&self, region: Region) -> Option<f32> {
+    pub fn share(&self, region: RegionIndex) -> Option<f32> {
         self.rows.share(region.0)
     }
 
     /// Where to search for `u` in [0, 1) in the distribution of the regions that light `region`.
-    pub fn near(&self, region: Region, u: f32) -> RowPart {
+    pub fn near(&self, region: RegionIndex, u: f32) -> RowPart {
         self.rows.near(region.0, u)
     }
 
@@ -269,15 +260,14 @@ impl SamplingGuide {
         let range =
             self.first_members[region as usize] as usize..self.first_members[region as usize + 1] as usize;
         let members = &self.members[range];
-        let place = members.partition_point(|member| member.end <= u);
-        let &Member { patch, end } = members.get(place)?;
-        let start = if place == 0 { 0.0 } else { members[place - 1].end };
+        let (place, start, end) = interval_at(members, |member| member.end, u)?;
+        let patch = members[place].patch;
         let u = ((u - start) / (end - start)).clamp(0.0, 1.0 - f32::EPSILON);
         Some(GuidedPatch { patch, u, density: probability * self.patches[patch.place()].density })
     }
 
     /// Where to search for the region of `patch` in the distribution of the regions that light `region`.
-    pub fn near_patch(&self, region: Region, patch: PatchIndex) -> RowPart {
+    pub fn near_patch(&self, region: RegionIndex, patch: PatchIndex) -> RowPart {
         let other = self.patches[patch.place()].region;
         self.rows.near_column(region.0, other.0)
     }
@@ -295,193 +285,20 @@ fn rounded_share(known: f64) -> f32 {
     (MAX_SHARE * SHARE_STEPS * known as f32).round() / SHARE_STEPS
 }
 
-/// Sparse discrete distributions over the same columns, one per row. They are too large for the near caches, so what is
-/// read together is stored together.
-#[derive(Clone, Debug, Default)]
-struct Rows {
-    /// The columns are divided into parts: columns of the same part differ in this many of their lowest bits only.
-    part_bits: u32,
-    heads: Vec<Head>,
-    /// Of all rows, one after the other; columns ascend in each row.
-    entries: Vec<Entry>,
-    /// Per row, the entry at which each part of the columns begins, and that at which each part of the cumulative
-    /// probability in [0, 1] begins: a search then looks at few entries (Chen and Asau, "On Generating Random Variates
-    /// from an Empirical Distribution", 1974).
-    column_index: Vec<u32>,
-    cumulative_index: Vec<u32>,
-}
-
-/// Where a row is.
-#[derive(Clone, Copy, Debug)]
-struct Head {
-    /// Its first entry.
-    start: usize,
-    /// Number of its entries.
-    count: u32,
-    /// Share of the samples that are placed by this row.
-    share: f32,
-}
-
-/// A column of a row, and the sum of the row's probabilities up to and including it; the last sum is 1.
-#[derive(Clone, Copy, Debug, Default)]
-struct Entry {
-    column: u32,
-    end: f32,
-}
-
-/// A part of a row to be searched. Its middle entry is read in advance, so that the cache misses of several samples
-/// overlap.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct RowPart {
-    /// Where the row begins in the list of all entries, and the number of its entries.
-    begin: usize,
-    count: u32,
-    /// The part is the range `first..last` of the row's entries; `entry` is the one at `middle`.
-    first: u32,
-    last: u32,
-    middle: u32,
-    entry: Entry,
-}
-
-/// Number of parts in each index of a row.
-const PARTS: usize = 64;
-
-/// The distribution in proportion to weights at ascending columns; empty if no weight is positive and finite.
-fn cumulative(mut weights: Vec<(u32, f64)>) -> Vec<Entry> {
-    weights.retain(|(_, weight)| weight.is_finite() && *weight > 0.0);
-    let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
-    let (last, mut running) = (weights.len().saturating_sub(1), 0.0);
-    let entry = |(place, (column, weight)): (usize, (u32, f64))| {
-        running += weight / sum;
-        Entry { column, end: if place == last { 1.0 } else { running as f32 } }
-    };
-    weights.into_iter().enumerate().map(entry).collect()
-}
-
-impl Rows {
-    /// Without rows yet, for columns below `columns`.
-    fn new(columns: usize) -> Self {
-        let part_bits = columns.div_ceil(PARTS).max(1).next_power_of_two().trailing_zeros();
-        Self { part_bits, ..Self::default() }
-    }
-
-    /// Appends a row, whose columns ascend.
-    fn push(&mut self, share: f32, row: &[Entry]) {
-        self.heads.push(Head { start: self.entries.len(), count: row.len() as u32, share });
-        self.entries.extend_from_slice(row);
-        for part in 0..=PARTS {
-            let first_column = (part as u64) << self.part_bits;
-            self.column_index
-                .push(row.partition_point(|entry| u64::from(entry.column) < first_column) as u32);
-            let start = part as f32 / PARTS as f32;
-            self.cumulative_index.push(row.partition_point(|entry| entry.end <= start) as u32);
-        }
-    }
-
-    fn part(&self, index: &[u32], row: u32, part: usize) -> RowPart {
-        let at = row as usize * (PARTS + 1) + part.min(PARTS - 1);
-        let Head { start: begin, count, .. } = self.heads[row as usize];
-        let (first, last) = (index[at], index[at + 1]);
-        let middle = first.midpoint(last);
-        let entry = self.entries.get(begin + middle as usize).copied().unwrap_or_default();
-        RowPart { begin, count, first, last, middle, entry }
-    }
-
-    fn entries_of(&self, row: u32) -> &[Entry] {
-        let Head { start, count, .. } = self.heads[row as usize];
-        &self.entries[start..start + count as usize]
-    }
-
-    fn share(&self, row: u32) -> Option<f32> {
-        let head = self.heads[row as usize];
-        (head.count > 0).then_some(head.share)
-    }
-
-    fn near(&self, row: u32, u: f32) -> RowPart {
-        self.part(&self.cumulative_index, row, (u * PARTS as f32) as usize)
-    }
-
-    fn near_column(&self, row: u32, column: u32) -> RowPart {
-        self.part(&self.column_index, row, (column >> self.part_bits) as usize)
-    }
-
-    /// The first entry of a part for which `is_before` is false, or the one after the part, `None` at the end of the
-    /// row; and the `end` of the entry before it.
-    fn find(&self, part: &RowPart, is_before: impl Fn(&Entry) -> bool) -> (Option<&Entry>, f32) {
-        let range = if part.first < part.last && is_before(&part.entry) {
-            part.middle + 1..part.last
-        } else {
-            part.first..part.middle
-        };
-        let searched = &self.entries[part.begin + range.start as usize..part.begin + range.end as usize];
-        let at = range.start as usize + searched.partition_point(is_before);
-        let start = if at == 0 { 0.0 } else { self.entries[part.begin + at - 1].end };
-        (self.entries.get(part.begin + at).filter(|_| at < part.count as usize), start)
-    }
-
-    fn pick(&self, part: &RowPart, u: f32) -> Option<(u32, f32, f32)> {
-        let (entry, start) = self.find(part, |entry| entry.end <= u);
-        let &Entry { column, end } = entry?;
-        let probability = end - start;
-        (probability > 0.0)
-            .then(|| (column, ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON), probability))
-    }
-
-    fn probability(&self, part: &RowPart, column: u32) -> f32 {
-        if part.first == part.last {
-            return 0.0;
-        }
-        let (entry, start) = self.find(part, |entry| entry.column < column);
-        entry.filter(|entry| entry.column == column).map_or(0.0, |entry| entry.end - start)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn rows() -> Rows {
-        let mut rows = Rows::new(8);
-        rows.push(0.4, &cumulative(vec![(1, 2.0), (4, 6.0), (7, 0.0)]));
-        rows.push(0.4, &cumulative(vec![(0, 0.0), (3, f64::NAN)]));
-        rows.push(0.25, &cumulative(vec![(5, 1e-30)]));
-        rows
-    }
-
-    fn pick(rows: &Rows, row: u32, u: f32) -> Option<(u32, f32, f32)> {
-        rows.pick(&rows.near(row, u), u)
-    }
-
-    fn probability(rows: &Rows, row: u32, column: u32) -> f32 {
+    fn probability(rows: &SparseDistributions, row: u32, column: u32) -> f32 {
         rows.probability(&rows.near_column(row, column), column)
-    }
-
-    #[test]
-    fn probabilities_are_in_proportion_to_the_weights() {
-        let rows = rows();
-        for (row, column, expected) in [(0, 1, 0.25), (0, 4, 0.75), (0, 7, 0.0), (0, 5, 0.0), (2, 5, 1.0)] {
-            assert_eq!(probability(&rows, row, column), expected);
-        }
-        for (u, column, within, probability) in
-            [(0.125, 1, 0.5, 0.25), (0.25, 4, 0.0, 0.75), (0.625, 4, 0.5, 0.75)]
-        {
-            assert_eq!(pick(&rows, 0, u), Some((column, within, probability)));
-        }
-    }
-
-    #[test]
-    fn a_row_without_positive_weights_has_no_share() {
-        let rows = rows();
-        assert_eq!([0, 1, 2].map(|row| rows.share(row)), [Some(0.4), None, Some(0.25)]);
-        assert_eq!(pick(&rows, 1, 0.5), None);
     }
 
     #[test]
     fn patches_are_chosen_by_the_light_that_leaves_them() {
         // Two regions: patches 0 to 2 of unequal light and area, and patch 3.
         let (weights, areas) = ([1.0, 0.0, 3.0, 1.0], [1.0, 1.0, 2.0, 4.0]);
-        let patches = [0, 0, 0, 1].map(|region| PatchInRegion { region: Region(region), density: 0.0 });
-        let mut rows = Rows::new(2);
+        let patches = [0, 0, 0, 1].map(|region| PatchInRegion { region: RegionIndex(region), density: 0.0 });
+        let mut rows = SparseDistributions::new(2, 0);
         rows.push(0.4, &cumulative(vec![(0, 3.0), (1, 1.0)]));
         let mut guide = SamplingGuide { rows, patches: patches.to_vec(), ..SamplingGuide::empty() };
         for members in [&[PatchIndex(0), PatchIndex(1), PatchIndex(2)][..], &[PatchIndex(3)]] {
@@ -508,14 +325,14 @@ mod tests {
 
     #[test]
     fn what_is_discovered_becomes_a_part_of_the_distribution() {
-        let patches = [0, 1, 2].map(|region| PatchInRegion { region: Region(region), density: 0.0 });
-        let mut rows = Rows::new(3);
+        let patches = [0, 1, 2].map(|region| PatchInRegion { region: RegionIndex(region), density: 0.0 });
+        let mut rows = SparseDistributions::new(3, 0);
         rows.push(0.25, &cumulative(vec![(0, 3.0), (1, 1.0)]));
         rows.push(0.25, &cumulative(vec![(0, 1.0)]));
         rows.push(0.0, &[]);
         let guide = SamplingGuide { rows, patches: patches.to_vec(), ..SamplingGuide::empty() };
         let discovery = |receiver, patch, share| Discovery {
-            receiver: Region(receiver),
+            receiver: RegionIndex(receiver),
             patch: PatchIndex(patch),
             share,
         };
@@ -528,29 +345,5 @@ mod tests {
         // However bright a single sample was, as much is left of what was known.
         let learned = guide.with(&[discovery(0, 2, 0.9)]);
         assert_eq!(f64::from(probability(&learned.rows, 0, 2)), MAX_DISCOVERED);
-    }
-
-    #[test]
-    fn a_search_by_the_indices_gives_the_same_as_one_through_the_whole_row() {
-        let mut rows = Rows::new(1000);
-        let weight = |column: u32| if column % 7 < 3 { 0.0 } else { f64::from(column % 13).powi(4) };
-        rows.push(0.4, &cumulative((0..1000).map(|column| (column, weight(column))).collect()));
-        let sparse = (0..1000).filter(|column| column % 250 == 3).map(|column| (column, 1.0));
-        rows.push(0.4, &cumulative(sparse.collect()));
-        for row in 0..2 {
-            let head = rows.heads[row as usize];
-            let entries = &rows.entries[head.start..head.start + head.count as usize];
-            for step in 0..5000 {
-                let u = step as f32 / 5000.0;
-                let at = entries.partition_point(|entry| entry.end <= u);
-                assert_eq!(pick(&rows, row, u).map(|picked| picked.0), Some(entries[at].column), "{u}");
-            }
-            for column in 0..1000 {
-                let expected = entries
-                    .binary_search_by_key(&column, |entry| entry.column)
-                    .map_or(0.0, |at| entries[at].end - if at == 0 { 0.0 } else { entries[at - 1].end });
-                assert_eq!(probability(&rows, row, column), expected, "{column}");
-            }
-        }
     }
 }

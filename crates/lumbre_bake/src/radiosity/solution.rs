@@ -28,6 +28,9 @@ pub(crate) struct RadiosityEquation<'a> {
     pub tolerance: f64,
 }
 
+/// Relative residual at which the solver stops: well below the error of the form factors.
+pub(crate) const TOLERANCE: f64 = 1e-5;
+
 /// Limit of the iterations: more than any ρ <= 0.999 needs for a residual of 1e-12.
 pub(crate) const MAX_ITERATIONS: u32 = 30_000;
 

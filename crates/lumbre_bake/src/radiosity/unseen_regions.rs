@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use glam::{IVec3, Vec3};
 
 use super::larger_patches::LargerPatches;
-use super::patch_index::PatchIndex;
+use super::patch_index::RegionIndex;
 use crate::scene::BakeScene;
 
 /// Side of the cubes within which exchange is shared out, in sides of a region.
@@ -37,7 +37,7 @@ struct Cube {
     /// Square canonical units.
     area: f64,
     /// Its brightest regions, each with the power that leaves it.
-    bright: Vec<(PatchIndex, f64)>,
+    bright: Vec<(RegionIndex, f64)>,
 }
 
 impl UnseenRegions {
@@ -45,7 +45,7 @@ impl UnseenRegions {
     pub fn new(scene: &BakeScene, regions: &LargerPatches, side: f32, radiosity: &[f64]) -> Self {
         let mut numbers: BTreeMap<[i32; 3], u32> = BTreeMap::new();
         let mut unseen = Self { places: Vec::new(), cube_of: Vec::new(), cubes: Vec::new() };
-        for (region, radiosity) in PatchIndex::all(radiosity.len()).zip(radiosity) {
+        for (region, radiosity) in RegionIndex::all(radiosity.len()).zip(radiosity) {
             let patch = &regions.patches.list[region.place()];
             let centroid = regions.patches.corners(scene, patch).iter().sum::<Vec3>() / 3.0;
             let normal = scene.triangles[patch.triangle as usize].side_normal(patch.side);
@@ -70,14 +70,19 @@ impl UnseenRegions {
     }
 
     /// Adds guesses, as if all of a cube were seen equally well, to the light that `receiver` gets from other regions.
-    /// That is `flux`, by the number of the region, ascending; `exchange` has the exchange areas of the same regions.
-    pub fn add(&self, receiver: PatchIndex, exchange: &[(PatchIndex, f64)], flux: &mut Vec<(u32, f64)>) {
+    /// That is `flux`, by region, ascending; `exchange` has the exchange areas of the same regions.
+    pub fn add(
+        &self,
+        receiver: RegionIndex,
+        exchange: &[(RegionIndex, f64)],
+        flux: &mut Vec<(RegionIndex, f64)>,
+    ) {
         let known: f64 = flux.iter().map(|(_, flux)| flux).sum();
         let mut by_cube: BTreeMap<u32, f64> = BTreeMap::new();
         for (region, g) in exchange {
             *by_cube.entry(self.cube_of[region.place()]).or_default() += g;
         }
-        let mut guesses: Vec<(u32, f64)> = Vec::new();
+        let mut guesses: Vec<(RegionIndex, f64)> = Vec::new();
         for (number, g) in by_cube {
             let cube = &self.cubes[number as usize];
             for &(region, power) in &cube.bright {
@@ -86,7 +91,7 @@ impl UnseenRegions {
                     break;
                 }
                 if self.face_each_other(receiver, region) {
-                    guesses.push((region.0, guess));
+                    guesses.push((region, guess));
                 }
             }
         }
@@ -107,14 +112,14 @@ impl UnseenRegions {
     }
 
     /// The brightest regions near `region` that lie in front of `receiver`, each with the power that leaves it.
-    pub fn around(&self, receiver: PatchIndex, region: PatchIndex) -> Vec<(PatchIndex, f64)> {
+    pub fn around(&self, receiver: RegionIndex, region: RegionIndex) -> Vec<(RegionIndex, f64)> {
         let cube = self.cube_of.get(region.place()).map(|&cube| &self.cubes[cube as usize]);
         let bright = cube.map_or(&[][..], |cube| &cube.bright);
         bright.iter().copied().filter(|&(near, _)| self.face_each_other(receiver, near)).collect()
     }
 
     /// Whether the middles of two regions lie in front of each other.
-    fn face_each_other(&self, receiver: PatchIndex, other: PatchIndex) -> bool {
+    fn face_each_other(&self, receiver: RegionIndex, other: RegionIndex) -> bool {
         let ((from, normal), (to, other_normal)) =
             (self.places[receiver.place()], self.places[other.place()]);
         let along = to - from;
@@ -138,8 +143,12 @@ mod tests {
             (Vec3::new(1.0, 3.0, 1.0), up),
             (Vec3::new(0.0, -3.0, 0.0), -up),
         ];
-        let bright =
-            vec![(PatchIndex(3), 60.0), (PatchIndex(4), 60.0), (PatchIndex(2), 50.0), (PatchIndex(1), 1.0)];
+        let bright = vec![
+            (RegionIndex(3), 60.0),
+            (RegionIndex(4), 60.0),
+            (RegionIndex(2), 50.0),
+            (RegionIndex(1), 1.0),
+        ];
         let cubes = vec![Cube { area: 1.0, bright: Vec::new() }, Cube { area: 10.0, bright }];
         UnseenRegions { places, cube_of: vec![0, 1, 1, 1, 1], cubes }
     }
@@ -147,11 +156,11 @@ mod tests {
     #[test]
     fn a_bright_region_beside_one_that_was_seen_is_guessed_at() {
         // Only the dark region was hit by rays.
-        let mut flux = vec![(1, 0.2)];
-        unseen().add(PatchIndex(0), &[(PatchIndex(1), 1.0)], &mut flux);
+        let mut flux = vec![(RegionIndex(1), 0.2)];
+        unseen().add(RegionIndex(0), &[(RegionIndex(1), 1.0)], &mut flux);
         // All that is guessed brings at most a certain share of what is known, and there is no more than one guess
         // for one known region.
-        assert_eq!(flux.iter().map(|(region, _)| *region).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!(flux.iter().map(|(region, _)| region.0).collect::<Vec<_>>(), [1, 2]);
         assert_eq!(flux[0].1, 0.2);
         assert!((flux[1].1 / (0.2 * MAX_GUESS) - 1.0).abs() < 1e-9, "{flux:?}");
     }
@@ -159,22 +168,22 @@ mod tests {
     #[test]
     fn a_guess_that_is_small_beside_the_known_light_is_left_out() {
         let known = 50.0 / 10.0 / MIN_GUESS * 1.01;
-        let mut flux = vec![(1, known)];
-        unseen().add(PatchIndex(0), &[(PatchIndex(1), 1.0)], &mut flux);
-        assert_eq!(flux, [(1, known)]);
+        let mut flux = vec![(RegionIndex(1), known)];
+        unseen().add(RegionIndex(0), &[(RegionIndex(1), 1.0)], &mut flux);
+        assert_eq!(flux, [(RegionIndex(1), known)]);
     }
 
     #[test]
     fn around_a_region_are_the_bright_ones_that_face_the_receiver() {
-        let near = unseen().around(PatchIndex(0), PatchIndex(1));
-        assert_eq!(near, [(PatchIndex(2), 50.0), (PatchIndex(1), 1.0)]);
-        assert!(UnseenRegions::default().around(PatchIndex(0), PatchIndex(1)).is_empty());
+        let near = unseen().around(RegionIndex(0), RegionIndex(1));
+        assert_eq!(near, [(RegionIndex(2), 50.0), (RegionIndex(1), 1.0)]);
+        assert!(UnseenRegions::default().around(RegionIndex(0), RegionIndex(1)).is_empty());
     }
 
     #[test]
     fn without_known_light_there_is_nothing_to_guess() {
         let mut flux = Vec::new();
-        unseen().add(PatchIndex(0), &[], &mut flux);
+        unseen().add(RegionIndex(0), &[], &mut flux);
         assert!(flux.is_empty());
     }
 }

@@ -8,14 +8,13 @@ use glam::Vec3;
 
 use super::changed_box::ChangedBox;
 use super::direct_light_invalidation::{ShadowVolumes, shadowed};
-use super::fingerprints::{bounds, emission, fingerprint, first_triangles, layouts};
+use super::fingerprints::{ObjectPrints, fingerprint};
 use super::samples::{Content, ObjectSamples, TexelSamples};
+use crate::BakeOptions;
 use crate::content_hash::{ContentHash, Hashes};
 use crate::coverage::CoveredTexels;
-use crate::final_gather::ReusedGather;
 use crate::scene::{Canonical, SceneObject, density_of};
 use crate::sources::{Direct, Sources};
-use crate::{BakeOptions, RebakeReport};
 
 /// With more changed objects than this the whole scene is baked.
 const MAX_CHANGED: usize = 64;
@@ -78,6 +77,8 @@ fn count_missing<'h>(
 /// What differs from the former bake, and what the former bake knows of everything else.
 pub(crate) struct Changes<'a> {
     pub former: &'a Content,
+    /// Of the new scene.
+    pub prints: ObjectPrints,
     /// Whether nothing differs, so that everything is kept as it is.
     pub nothing_changed: bool,
     /// Per object, whether it is new or has changed.
@@ -92,8 +93,6 @@ pub(crate) struct Changes<'a> {
     pub names: Vec<String>,
     /// Per covered texel, its former samples, if it still shows the same surface.
     pub known: Vec<Option<&'a TexelSamples>>,
-    /// Per covered texel, its former direct light, if that cannot have changed.
-    pub known_direct: Vec<Option<Direct>>,
     /// Per texel of all maps, the irradiance of the former bake, W/m²; NaN where that is not known.
     pub former_light: Vec<Vec3>,
 }
@@ -107,6 +106,7 @@ impl<'a> Changes<'a> {
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
     ) -> Self {
+        let prints = ObjectPrints::new(sources, texels);
         let mut by_hash: HashMap<ContentHash, Vec<&'a ObjectSamples>> = HashMap::new();
         // Lists are in reverse order, so that of several equal objects the first is popped first.
         for object in former.objects.iter().rev() {
@@ -116,8 +116,8 @@ impl<'a> Changes<'a> {
         let unchanged: Vec<Option<&'a ObjectSamples>> = hashes
             .objects
             .iter()
-            .zip(layouts(texels))
-            .map(|(hash, layout)| by_hash.get_mut(hash)?.pop_if(|object| object.layout == layout))
+            .zip(&prints.layouts)
+            .map(|(hash, layout)| by_hash.get_mut(hash)?.pop_if(|object| object.layout == *layout))
             .collect();
         let gone: Vec<&ObjectSamples> = former
             .objects
@@ -125,34 +125,26 @@ impl<'a> Changes<'a> {
             .filter(|object| !unchanged.iter().flatten().any(|other| std::ptr::eq(*other, *object)))
             .collect();
         let changed: Vec<bool> = unchanged.iter().map(Option::is_none).collect();
-        let emission = emission(sources, texels);
         let differs = |(emission, former): (&u32, &Option<&ObjectSamples>)| {
             *emission != former.map_or(0, |former| former.emission)
         };
         let emitters_changed =
-            emission.iter().zip(&unchanged).any(differs) || gone.iter().any(|gone| gone.emission != 0);
+            prints.emission.iter().zip(&unchanged).any(differs) || gone.iter().any(|gone| gone.emission != 0);
         let lights_or_sky_changed = former.lights != hashes.lights;
-        let bounds = bounds(texels);
-        let after = bounds.into_iter().zip(&changed).filter(|(_, changed)| **changed);
-        let after = after.map(|(bounds, _)| ChangedBox { bounds, former_exitance: None });
+        let after = prints.bounds.iter().zip(&changed).filter(|(_, changed)| **changed);
+        let after = after.map(|(&bounds, _)| ChangedBox { bounds, former_exitance: None });
         let before = gone
             .iter()
             .map(|object| ChangedBox { bounds: object.bounds, former_exitance: Some(object.exitance) });
         let boxes: Vec<ChangedBox> = after.chain(before).filter(|b| !b.bounds.is_empty()).collect();
         let names = names(objects, &changed, &gone, lights_or_sky_changed);
-        let (known, former_light) = known(texels, &unchanged);
+        let (known, former_light) = known(texels, &prints.first_triangles, &unchanged);
         let nothing_changed = former.content == hashes.content;
         let lights_changed = emitters_changed || lights_or_sky_changed;
-        let unless_shadowed = |(known, is_shadowed): (&Option<&TexelSamples>, bool)| {
-            known.filter(|_| !is_shadowed).map(|known| known.direct)
-        };
         let shadow_volumes = ShadowVolumes::new(sources, &boxes);
-        let known_direct = match lights_changed {
-            true => vec![None; texels.list.len()],
-            false => known.iter().zip(shadowed(texels, &shadow_volumes)).map(unless_shadowed).collect(),
-        };
         Self {
             former,
+            prints,
             nothing_changed,
             changed,
             boxes,
@@ -160,24 +152,19 @@ impl<'a> Changes<'a> {
             lights_changed,
             names,
             known,
-            known_direct,
             former_light,
         }
     }
 
-    /// What is kept of the former bake, of whose light by bounces that is `kept`. `mean` is the mean irradiance, mean of
-    /// the channels, W/m².
-    pub fn report(&self, texels: &CoveredTexels<'_>, kept: Option<&ReusedGather>, mean: f64) -> RebakeReport {
-        let open = texels.open().count();
-        let error = kept.map_or(0.0, |kept| kept.error(open));
-        RebakeReport {
-            whole: String::new(),
-            changed: self.names.clone(),
-            texels: open,
-            relit: texels.open().filter(|(texel, _)| self.known_direct[texel.place()].is_none()).count(),
-            gathered: kept.map_or(0, |kept| open - kept.count()),
-            neglected: if mean > 0.0 { error / mean } else { 0.0 },
+    /// Per covered texel, its former direct light, if that cannot have changed.
+    pub fn known_direct_light(&self, texels: &CoveredTexels<'_>) -> Vec<Option<Direct>> {
+        if self.lights_changed {
+            return vec![None; texels.list.len()];
         }
+        let unless_shadowed = |(known, is_shadowed): (&Option<&TexelSamples>, bool)| {
+            known.filter(|_| !is_shadowed).map(|known| known.direct)
+        };
+        self.known.iter().zip(shadowed(texels, &self.shadow_volumes)).map(unless_shadowed).collect()
     }
 }
 
@@ -200,12 +187,14 @@ fn names(objects: &[SceneObject], changed: &[bool], gone: &[&ObjectSamples], lig
 }
 
 /// The former samples of every covered texel that still shows the same surface, and the former irradiance per texel of
-/// all maps. `unchanged` holds the former samples of each object that has not changed.
+/// all maps. `first` holds each object's first triangle, `unchanged` the former samples of each object that has not
+/// changed.
 fn known<'a>(
     texels: &CoveredTexels<'_>,
+    first: &[u32],
     unchanged: &[Option<&'a ObjectSamples>],
 ) -> (Vec<Option<&'a TexelSamples>>, Vec<Vec3>) {
-    let (layout, first) = (texels.layout, first_triangles(texels));
+    let layout = texels.layout;
     let mut light = vec![Vec3::NAN; layout.texels];
     for (map, object) in layout.maps.iter().zip(unchanged) {
         for texel in object.iter().flat_map(|object| &object.texels) {
@@ -218,7 +207,7 @@ fn known<'a>(
         .list
         .iter()
         .map(|texel| {
-            let object = texel.object as usize;
+            let object = texel.map.place();
             let list = &unchanged[object].filter(|_| !texel.is_hidden())?.texels;
             let cell = texel.y * layout.maps[object].width + texel.x;
             let samples = &list[list.binary_search_by_key(&cell, |samples| samples.cell).ok()?];

@@ -14,7 +14,6 @@ use crate::coverage::texel_geometry::positions_of;
 use crate::coverage::{CoveredTexels, TexelGroups, receiver};
 use crate::scene::{Canonical, PlacedLight};
 use crate::sources::Sources;
-use crate::sources::emitters::lamps;
 
 /// Canonical units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,8 +104,8 @@ pub(crate) fn shadowed(texels: &CoveredTexels<'_>, volumes: &ShadowVolumes) -> V
 /// The lights, and the emitters by lamps (connected emissive surfaces).
 fn bounded_sources(sources: &Sources<'_>) -> Vec<Source> {
     let mut corners_of_lamps: HashMap<u32, Vec<Vec3>> = HashMap::new();
-    for (emitter, lamp) in sources.emitters.iter().zip(lamps(sources.scene, &sources.emitters)) {
-        corners_of_lamps.entry(lamp).or_default().extend(emitter.corners);
+    for (emitter, lamp) in sources.emitters.iter().zip(&*sources.lamps) {
+        corners_of_lamps.entry(*lamp).or_default().extend(emitter.corners);
     }
     let lamps = corners_of_lamps.values().map(|points| Source::Near(Sphere::around(points.iter().copied())));
     let lights = sources.lights.iter().map(|light| Source::of_light(light, sources.scene.space));

@@ -11,14 +11,14 @@ use std::f32::consts::{PI, TAU};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::change_sums::{ChangeSums, Range, cone_to_sphere, direction_in_cone};
 use super::changed_box::ChangedBox;
 use super::changes::Changes;
 use super::choice;
-use super::estimate::{Estimate, Range, cone_to_sphere, direction_in_cone};
 use crate::bounds::Bounds;
 use crate::chunks::in_chunks;
 use crate::coverage::{CoveredTexels, Texel, TexelGroups, receiver};
-use crate::direct_light::{DirectLight, LocalLight};
+use crate::direct_light::LocalLight;
 use crate::final_gather::ReusedGather;
 use crate::monitor::BakeMonitor;
 use crate::radiosity::solution::gather;
@@ -39,34 +39,8 @@ const NEAR_BOX: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
-/// The indirect light of a former bake that this one keeps. `exchange` is the new scene's, with its form factors. The
-/// notes count about how many rays it took to decide.
-pub(crate) fn reused_gather(
-    changes: &Changes<'_>,
-    sources: &Sources<'_>,
-    texels: &CoveredTexels<'_>,
-    direct: &DirectLight,
-    (exchange, factors): (&Exchange, &FormFactors),
-    options: &BakeOptions,
-    monitor: &mut BakeMonitor<'_>,
-) -> Result<(ReusedGather, StageNotes), BakeError> {
-    let change =
-        monitor.run_interruptible(1.0, || IndirectChange::new(sources, changes, texels, &direct.texels))?;
-    let unknown = if changes.nothing_changed { Vec::new() } else { change.unknown_backs(&exchange.patches) };
-    let light = PatchLight {
-        patches: &exchange.patches,
-        exitance: &exchange.exitance,
-        change: &[],
-        unknown: &unknown,
-    };
-    let of_patches = change.of_patches(light, factors, options, monitor)?;
-    let light = PatchLight { change: &of_patches, ..light };
-    let reused = change.keep(light, &direct.local, options, monitor)?;
-    Ok((reused, StageNotes::of_rays(change.rays(&of_patches))))
-}
-
 /// The light before and after, as far as the estimate needs it.
-struct IndirectChange<'a> {
+pub(super) struct IndirectChange<'a> {
     scene: &'a BakeScene,
     texels: &'a CoveredTexels<'a>,
     changes: &'a Changes<'a>,
@@ -81,7 +55,7 @@ struct IndirectChange<'a> {
 
 /// The light that leaves the patches in the new scene, and the change of their irradiance by bounces.
 #[derive(Clone, Copy)]
-struct PatchLight<'a> {
+struct PatchChange<'a> {
     patches: &'a Patches,
     /// Without emission, W/m².
     exitance: &'a [Vec3],
@@ -93,7 +67,7 @@ struct PatchLight<'a> {
 
 impl<'a> IndirectChange<'a> {
     /// `direct` is the direct light of every covered texel in the new scene.
-    fn new(
+    pub fn new(
         sources: &Sources<'a>,
         changes: &'a Changes<'a>,
         texels: &'a CoveredTexels<'a>,
@@ -116,28 +90,46 @@ impl<'a> IndirectChange<'a> {
         }
     }
 
-    /// About how many rays the estimate took.
-    fn rays(&self, of_patches: &[Range]) -> u64 {
-        let origins = if of_patches.is_empty() { 0 } else { of_patches.len() + self.blocks.members.len() };
-        u64::from(RAYS) * origins as u64
+    /// The light by bounces of the former bake that this one keeps, given the new scene's `exchange` with its form
+    /// factors. The notes count about how many rays it took to decide.
+    pub fn kept(
+        &self,
+        exchange: &Exchange,
+        factors: &FormFactors,
+        local: &LocalLight,
+        options: &BakeOptions,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<(ReusedGather, StageNotes), BakeError> {
+        if self.changes.nothing_changed {
+            return Ok((choice::keep_all(self.changes), StageNotes::default()));
+        }
+        let unknown = self.unknown_backs(&exchange.patches);
+        let light = PatchChange {
+            patches: &exchange.patches,
+            exitance: &exchange.exitance,
+            change: &[],
+            unknown: &unknown,
+        };
+        let of_patches = self.of_patches(light, factors, options, monitor)?;
+        let light = PatchChange { change: &of_patches, ..light };
+        let of_texels = self.of_texels(light, options, monitor)?;
+        let reused = choice::choose(self.changes, &self.texels.list, &of_texels, local, options.error);
+        let origins = of_patches.len() + self.blocks.members.len();
+        Ok((reused, StageNotes::of_rays(u64::from(RAYS) * origins as u64)))
     }
 
     /// The change of each patch's irradiance by bounces, W/m²: Δ = S + F ρ Δ, where S is the immediate change. F and ρ
     /// are not negative, so that bounds of S give bounds of Δ.
     fn of_patches(
         &self,
-        light: PatchLight<'_>,
+        light: PatchChange<'_>,
         factors: &FormFactors,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<Range>, BakeError> {
-        if self.changes.nothing_changed {
-            return Ok(Vec::new());
-        }
         let (patches, solver) = (light.patches, options.solver);
-        let is_new = |patch: &Patch| {
-            self.changes.changed[self.scene.triangles[patch.triangle as usize].object as usize]
-        };
+        let is_new =
+            |patch: &Patch| self.changes.changed[self.scene.triangles[patch.triangle as usize].map.place()];
         let immediate: Vec<Range> = in_chunks(patches.list.len(), monitor, |index| {
             let patch = &patches.list[index];
             if is_new(patch) || patch.reflectance == Vec3::ZERO {
@@ -191,26 +183,11 @@ impl<'a> IndirectChange<'a> {
         patches.list.par_iter().map(is_unknown).collect()
     }
 
-    /// Chooses what is kept of the light by bounces.
-    fn keep(
-        &self,
-        light: PatchLight<'_>,
-        local: &LocalLight,
-        options: &BakeOptions,
-        monitor: &mut BakeMonitor<'_>,
-    ) -> Result<ReusedGather, BakeError> {
-        if self.changes.nothing_changed {
-            return Ok(choice::keep_all(self.changes));
-        }
-        let change = self.of_texels(light, options, monitor)?;
-        Ok(choice::choose(self.changes, &self.texels.list, &change, local, options.error))
-    }
-
     /// By how much the light by bounces may have changed at every covered texel, W/m², root mean square of the
     /// channels. It is estimated for blocks of texels, and infinite in and next to changed boxes.
     fn of_texels(
         &self,
-        light: PatchLight<'_>,
+        light: PatchChange<'_>,
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Vec<f32>, BakeError> {
@@ -252,9 +229,9 @@ impl<'a> IndirectChange<'a> {
         &self,
         sequence: Sequence,
         point: &impl Fn(u32, f32, f32) -> Option<Receiver>,
-        light: PatchLight<'_>,
-    ) -> Estimate {
-        let mut estimate = Estimate::default();
+        light: PatchChange<'_>,
+    ) -> ChangeSums {
+        let mut sums = ChangeSums::default();
         // Running sums of the cones' solid angles over 2π.
         let mut ends = Vec::with_capacity(self.spheres.len());
         for ray in 0..RAYS {
@@ -280,7 +257,7 @@ impl<'a> IndirectChange<'a> {
             };
             let cosine = direction.dot(receiver.geometric_normal);
             if cosine <= 0.0 {
-                estimate.add([Vec3::ZERO; 2], 0.0);
+                sums.add([Vec3::ZERO; 2], 0.0);
                 continue;
             }
             // Probability densities of both strategies. Cones may overlap.
@@ -291,20 +268,20 @@ impl<'a> IndirectChange<'a> {
             let cone_density = if total > 0.0 { containing as f32 / (TAU * total) } else { cosine_density };
             let weight = cosine_density / (0.5 * cosine_density + 0.5 * cone_density);
             match self.change_along(receiver.origin, direction, light) {
-                Some(range) => estimate.add(range, weight),
+                Some(range) => sums.add(range, weight),
                 None => {
-                    estimate.add([Vec3::ZERO; 2], 0.0);
-                    estimate.unknown = true;
+                    sums.add([Vec3::ZERO; 2], 0.0);
+                    sums.unknown = true;
                 }
             }
         }
-        estimate
+        sums
     }
 
     /// The change of the light that arrives along a ray, as radiance times π. `None` if it is not known.
-    fn change_along(&self, origin: Vec3, direction: Vec3, light: PatchLight<'_>) -> Option<Range> {
+    fn change_along(&self, origin: Vec3, direction: Vec3, light: PatchChange<'_>) -> Option<Range> {
         let is_new =
-            |triangle: u32| self.changes.changed[self.scene.triangles[triangle as usize].object as usize];
+            |triangle: u32| self.changes.changed[self.scene.triangles[triangle as usize].map.place()];
         let is_black = |hit| matches!(hit, SurfaceHit::Back | SurfaceHit::Inside);
         let now = self.scene.first_surface(origin, direction, |_| true);
         let shows_new = matches!(now, SurfaceHit::Lit { triangle, .. } if is_new(triangle));
@@ -370,7 +347,7 @@ impl<'a> IndirectChange<'a> {
         triangle: u32,
         side: Side,
         at: (f32, f32),
-        light: PatchLight<'_>,
+        light: PatchChange<'_>,
     ) -> Option<(Vec3, Range)> {
         let Some(patch) = light.patches.at(triangle, side, at) else {
             return Some((Vec3::ZERO, [Vec3::ZERO; 2]));

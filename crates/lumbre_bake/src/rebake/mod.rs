@@ -1,6 +1,6 @@
 //! Baking again after a change: keeps the samples of a former bake that the change hardly affects, such as those of a
 //! room far from a crate that has moved. The rest is baked by the usual stages, which take what is kept as if they had
-//! computed it.
+//! computed it: [`Rebake`] stands around them.
 //!
 //! ```text
 //!   samples of the former bake ─► changes ─► objects that moved, came or went ─► boxes that block light, or did before
@@ -19,19 +19,17 @@
 //! is solved on patches, so that there is no noise where nothing changes. The estimated change of everything that is
 //! kept is added to the stated error, as its `reuse_error`.
 
+mod around_bake;
+mod change_sums;
 mod changed_box;
 mod changes;
 mod choice;
 mod direct_light_invalidation;
-mod estimate;
 mod fingerprints;
 mod indirect_change;
-mod reuse;
 mod samples;
 mod samples_file;
 
-pub(crate) use indirect_change::reused_gather;
-pub(crate) use reuse::Reuse;
+pub(crate) use around_bake::Rebake;
 pub use samples::Samples;
-pub(crate) use samples::TexelSamples;
 pub use samples_file::SamplesError;

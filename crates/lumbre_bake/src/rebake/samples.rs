@@ -4,7 +4,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::fingerprints::{fingerprint, first_triangles};
+use super::fingerprints::fingerprint;
 use crate::bounds::Bounds;
 use crate::color::channel_mean;
 use crate::content_hash::ContentHash;
@@ -128,13 +128,13 @@ impl Weights {
 }
 
 impl TexelSamples {
-    /// The samples of a bake, by object. `reuse_error` is per covered texel, and empty if nothing was kept.
-    pub fn by_object(lit: &LitTexels<'_>, reuse_error: &[f32]) -> Vec<Vec<Self>> {
+    /// The samples of a bake, by object. `first` holds each object's first triangle; `reuse_error` is per covered
+    /// texel, and empty if nothing was kept.
+    pub fn by_object(lit: &LitTexels<'_>, first: &[u32], reuse_error: &[f32]) -> Vec<Vec<Self>> {
         let LitTexels { texels, direct, indirect, .. } = lit;
-        let first = first_triangles(texels);
         let mut by_object: Vec<Vec<Self>> = vec![Vec::new(); texels.layout.maps.len()];
         for (covered, texel) in texels.open() {
-            let (index, object) = (covered.place(), texel.object as usize);
+            let (index, object) = (covered.place(), texel.map.place());
             let samples = Self {
                 cell: texel.y * texels.layout.maps[object].width + texel.x,
                 footprint: fingerprint(texel, first[object]),

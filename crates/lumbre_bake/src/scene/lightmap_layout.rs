@@ -4,6 +4,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use glam::Vec2;
 use lumbre_mesh::TriangleMesh;
 
 use super::SceneTriangle;
@@ -35,6 +36,21 @@ impl MapLayout {
         self.first..self.first + (self.width * self.height) as usize
     }
 
+    /// The four texels that bilinear filtering reads at a place of the map, in texels, and their weights, row by row.
+    /// Beyond the border, the texel at the border is read.
+    pub fn bilinear(&self, place: Vec2) -> [(MapTexel, f32); 4] {
+        let at = place - 0.5;
+        let low = at.floor();
+        let fraction = at - low;
+        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].map(|step| {
+            let step = Vec2::from(step);
+            let share = (Vec2::ONE - step) * (Vec2::ONE - fraction) + step * fraction;
+            // `as` saturates at 0.
+            let (x, y) = ((low.x + step.x) as u32, (low.y + step.y) as u32);
+            (self.texel(x.min(self.width - 1), y.min(self.height - 1)), share.x * share.y)
+        })
+    }
+
     /// The columns and rows at most `radius` away from those of a texel, its own included, row by row.
     pub fn around(&self, x: u32, y: u32, radius: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
         let columns = x.saturating_sub(radius)..=(x + radius).min(self.width - 1);
@@ -62,7 +78,7 @@ pub(crate) struct LightmapLayout {
 impl LightmapLayout {
     /// The texel at a point of a triangle; `None` if the point lies outside of its map.
     pub fn texel_at(&self, triangle: &SceneTriangle, at: (f32, f32)) -> Option<MapTexel> {
-        let map = &self.maps[triangle.object as usize];
+        let map = &self.maps[triangle.map.place()];
         let place = triangle.place_on_map(at);
         let (x, y) = (place.x as u32, place.y as u32);
         (x < map.width && y < map.height).then(|| map.texel(x, y))

@@ -17,6 +17,7 @@ use super::{LightmapLayout, MapLayout, PlacedPrimitive, SceneObject, SurfaceMate
 use crate::BakeError;
 use crate::bounds::Bounds;
 use crate::cancel_token::CancelToken;
+use crate::texel_index::MapIndex;
 
 /// The canonical space that the baker computes in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -82,8 +83,8 @@ pub(crate) struct SceneTriangle {
     pub uv: [Vec2; 3],
     /// Index of its material in [`BakeScene::surfaces`].
     pub surface: u32,
-    /// Index of its object, which is also that of its map.
-    pub object: u32,
+    /// Its map, and with that its object.
+    pub map: MapIndex,
     /// Vertex indices in its mesh.
     pub vertices: [u32; 3],
     /// Whether its back takes part in light transport too: it is double-sided, and not part of a closed piece.
@@ -180,7 +181,7 @@ impl BakeScene {
         };
         for ((index, object), map) in (0..).zip(objects).zip(&layout.maps) {
             let first = extraction.triangles.len();
-            extraction.extract_object(object, index, map);
+            extraction.extract_object(object, MapIndex(index), map);
             extraction.mark_closed(first);
         }
         extraction.unmark_hollow_solids();
@@ -227,7 +228,7 @@ struct Extraction<'a> {
 
 impl Extraction<'_> {
     /// Appends an object's triangles and materials.
-    fn extract_object(&mut self, object: &SceneObject, index: u32, map: &MapLayout) {
+    fn extract_object(&mut self, object: &SceneObject, index: MapIndex, map: &MapLayout) {
         let name = &object.name;
         let (mut not_finite, mut without_area) = (0, 0);
         for ((primitive, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
@@ -256,14 +257,14 @@ impl Extraction<'_> {
         }
     }
 
-    /// Appends the triangles of a primitive, which has the indices `surface` and `object`, on a map of `size` texels.
+    /// Appends the triangles of a primitive, which has the index `surface`, on a map of `size` texels.
     /// Returns how many are left out because they are not finite, and because they have no area.
     fn extract_triangles(
         &mut self,
         primitive: &PlacedPrimitive,
         mesh: &TriangleMesh,
         size: Vec2,
-        (surface, object): (u32, u32),
+        (surface, map): (u32, MapIndex),
     ) -> (usize, usize) {
         let positions: Vec<Vec3> =
             world_points(&primitive.transform, mesh).map(|point| self.space.position(point)).collect();
@@ -298,7 +299,7 @@ impl Extraction<'_> {
                 normals,
                 uv: vertices.map(uv),
                 surface,
-                object,
+                map,
                 vertices,
                 two_sided: primitive.material.double_sided,
                 closed: false,

@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use crate::disjoint_sets::DisjointSets;
 use crate::scene::mean_of_points::{mean_of_points, pieces};
 use crate::scene::{BakeScene, SceneTriangle, Side, SurfaceMaterial, position_bits};
+use crate::texel_index::MapIndex;
 
 /// A triangle of uniform radiance.
 #[derive(Clone, Debug)]
@@ -124,23 +125,23 @@ impl Coarsening {
 pub(crate) fn coarse_textures(scene: &BakeScene) -> Vec<String> {
     let coarsening = Coarsening::of(scene);
     // For each object, the triangle whose pieces span the most texels.
-    let mut worst: BTreeMap<u32, EmissionSampling> = BTreeMap::new();
+    let mut worst: BTreeMap<MapIndex, EmissionSampling> = BTreeMap::new();
     let across = |sampling: &EmissionSampling| sampling.texels / sampling.pieces as f32;
     for triangle in scene.triangles.iter().filter(|triangle| !triangle.is_hidden_duplicate) {
         let surface = &scene.surfaces[triangle.surface as usize];
         let sides = [Some(&surface.material.front), surface.material.back.as_ref()];
         if sides.into_iter().flatten().any(|side| side.emission != Vec3::ZERO) {
             let sampling = EmissionSampling::new(surface, triangle.vertices, coarsening);
-            let object_worst = worst.entry(triangle.object).or_insert(sampling);
+            let object_worst = worst.entry(triangle.map).or_insert(sampling);
             if across(&sampling) > across(object_worst) {
                 *object_worst = sampling;
             }
         }
     }
     let is_coarse = |sampling: &EmissionSampling| across(sampling) > TEXELS * 1.001;
-    let warning = |(object, sampling): (u32, EmissionSampling)| {
+    let warning = |(map, sampling): (MapIndex, EmissionSampling)| {
         let (across, points) = (across(&sampling), sampling.points);
-        let name = &scene.names[object as usize];
+        let name = &scene.names[map.place()];
         let mut warning = format!(
             "{name}: its emissive texture has {:.0} texels along a triangle; it lights as {} pieces along there, each of one radiance, the \
              mean of {across:.0} texels along its edge",

@@ -8,7 +8,8 @@ use std::collections::BinaryHeap;
 
 use super::emitter_bounds::BoundsLanes;
 use super::light_sources::Sources;
-use super::source_tree::clamp_below_one;
+use super::source_tree::{clamp_below_one, pick};
+use crate::sampling::interval_at;
 use crate::scene::Receiver;
 
 /// How the sources are sampled at a piece of surface. Sources in none of the lists bring no light there.
@@ -58,32 +59,22 @@ impl Sources<'_> {
         receiver: &Receiver,
         u: f32,
     ) -> Option<(Branch, f32, f32)> {
-        let last = shared.branches.len().checked_sub(1)?;
         if shared.near {
             let mut weights = [0.0f32; MAX_NEAR_BRANCHES];
             shared.bounds.weights(receiver, &mut weights);
             for (weight, (branch, _)) in weights.iter_mut().zip(&shared.branches).skip(shared.bounds.len()) {
                 *weight = self.weight(*branch, receiver, 0.0);
             }
-            let sum = weights[..shared.branches.len()].iter().sum::<f32>();
-            let target = u * sum;
-            let mut running = 0.0;
-            for (weight, (branch, _)) in weights.iter().zip(&shared.branches) {
-                if target < running + weight {
-                    let u = clamp_below_one((target - running) / weight);
-                    return Some((*branch, u, weight / sum));
-                }
-                running += weight;
+            let weights = &weights[..shared.branches.len()];
+            if weights.iter().all(|weight| *weight == 0.0) {
+                return None;
             }
-            // Rounding put `target` beyond the end of the sums, or all weights are 0.
-            let (branch, weight) = (shared.branches[last].0, weights[last.min(MAX_NEAR_BRANCHES - 1)]);
-            return (weight > 0.0).then(|| (branch, 1.0 - f32::EPSILON, weight / sum));
+            let (place, probability, u) = pick(weights, u);
+            return Some((shared.branches[place].0, u, probability));
         }
-        let at = shared.branches.partition_point(|(_, end)| *end <= u).min(last);
-        let start = if at == 0 { 0.0 } else { shared.branches[at - 1].1 };
-        let (branch, end) = shared.branches[at];
+        let (place, start, end) = interval_at(&shared.branches, |(_, end)| *end, u)?;
         let probability = (end - start).max(f32::MIN_POSITIVE);
-        Some((branch, clamp_below_one((u - start) / probability), probability))
+        Some((shared.branches[place].0, clamp_below_one((u - start) / probability), probability))
     }
 }
 
@@ -168,28 +159,12 @@ impl Sources<'_> {
             None => roots.extend(self.emitter_tree.root().map(Branch::Emitters)),
         }
         roots.extend(self.light_tree.root().map(Branch::Lights));
-        let weighted = |branch: Branch| Weighted { weight: self.weight(branch, receiver, reach), branch };
-        let mut open: BinaryHeap<Weighted> = roots.into_iter().map(weighted).collect();
-        let mut total: f32 = open.iter().map(|node| node.weight).sum();
-        let mut closed: Vec<Weighted> = Vec::new();
-        while let Some(node) = open.pop() {
-            let near = self.sine(node.branch, receiver, reach) > NEAR;
-            let (least, most) = if near { (OPENED_NEAR, MAX_NEAR_BRANCHES) } else { (OPENED, MAX_BRANCHES) };
-            let worth_it = node.weight > least * total && open.len() + closed.len() + 2 <= most;
-            match self.halves(node.branch).filter(|_| worth_it) {
-                Some(halves) => {
-                    let halves = halves.map(weighted);
-                    total += halves.iter().map(|half| half.weight).sum::<f32>() - node.weight;
-                    open.extend(halves);
-                }
-                None => closed.push(node),
-            }
-        }
+        let (mut nodes, total) = self.opened(roots, receiver, reach);
         // Nodes whose light does not arrive at all are left out.
-        closed.retain(|node| node.weight > 0.0);
-        closed.sort_unstable_by(|a, b| b.cmp(a));
+        nodes.retain(|node| node.weight > 0.0);
+        nodes.sort_unstable_by(|a, b| b.cmp(a));
         let mut individual = 0;
-        closed.retain(|node| {
+        nodes.retain(|node| {
             let may_be_individual = match node.branch {
                 Branch::Emitters(lamp) => !has_few_lamps && !shared.contains(&lamp),
                 Branch::Lights(_) => true,
@@ -209,24 +184,55 @@ impl Sources<'_> {
         });
         cut.lamps.sort_unstable();
         cut.lights.sort_unstable();
+        let near = nodes.iter().any(|node| self.sine(node.branch, receiver, reach) > NEAR);
+        cut.shared = self.shared_sources(nodes, near);
+        cut
+    }
+
+    /// Opens the nodes of most estimated light below the roots while that is worth it. Returns what is left closed, in
+    /// no order, and the estimated light of all of them.
+    fn opened(&self, roots: Vec<Branch>, receiver: &Receiver, reach: f32) -> (Vec<Weighted>, f32) {
+        let weighted = |branch: Branch| Weighted { weight: self.weight(branch, receiver, reach), branch };
+        let mut open: BinaryHeap<Weighted> = roots.into_iter().map(weighted).collect();
+        let mut total: f32 = open.iter().map(|node| node.weight).sum();
+        let mut closed: Vec<Weighted> = Vec::new();
+        while let Some(node) = open.pop() {
+            let near = self.sine(node.branch, receiver, reach) > NEAR;
+            let (least, most) = if near { (OPENED_NEAR, MAX_NEAR_BRANCHES) } else { (OPENED, MAX_BRANCHES) };
+            let worth_it = node.weight > least * total && open.len() + closed.len() + 2 <= most;
+            match self.halves(node.branch).filter(|_| worth_it) {
+                Some(halves) => {
+                    let halves = halves.map(weighted);
+                    total += halves.iter().map(|half| half.weight).sum::<f32>() - node.weight;
+                    open.extend(halves);
+                }
+                None => closed.push(node),
+            }
+        }
+        (closed, total)
+    }
+
+    /// Nodes that share samples, each with a probability in proportion to its estimated light. Where some are `near`,
+    /// receivers estimate that anew.
+    fn shared_sources(&self, mut nodes: Vec<Weighted>, near: bool) -> SharedSources {
         // Tree order, so that neighbours in the list are neighbours in space.
-        closed.sort_unstable_by_key(|node| node.branch);
-        let sum: f64 = closed.iter().map(|node| f64::from(node.weight)).sum();
-        cut.shared.near = closed.iter().any(|node| self.sine(node.branch, receiver, reach) > NEAR);
-        let (mut running, last) = (0.0, closed.len().saturating_sub(1));
-        for (place, node) in closed.iter().enumerate() {
+        nodes.sort_unstable_by_key(|node| node.branch);
+        let sum: f64 = nodes.iter().map(|node| f64::from(node.weight)).sum();
+        let mut shared = SharedSources { near, ..SharedSources::default() };
+        let (mut running, last) = (0.0, nodes.len().saturating_sub(1));
+        for (place, node) in nodes.iter().enumerate() {
             running += f64::from(node.weight);
             let end = if place == last { 1.0 } else { (running / sum) as f32 };
-            cut.shared.branches.push((node.branch, end));
+            shared.branches.push((node.branch, end));
         }
-        if cut.shared.near {
+        if near {
             let bounds = |node: &Weighted| match node.branch {
                 Branch::Emitters(node) => Some(self.emitter_tree.bounds(node)),
                 Branch::Lights(_) => None,
             };
-            cut.shared.bounds = BoundsLanes::new(&closed.iter().map_while(bounds).collect::<Vec<_>>());
+            shared.bounds = BoundsLanes::new(&nodes.iter().map_while(bounds).collect::<Vec<_>>());
         }
-        cut
+        shared
     }
 
     /// The nodes of all lamps, if those are to be sampled individually: if they are few, or fill most of what the

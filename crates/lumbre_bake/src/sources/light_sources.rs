@@ -2,6 +2,7 @@
 //! they bring to a receiver is computed in `irradiance`.
 
 use std::f32::consts::PI;
+use std::sync::Arc;
 
 use glam::Vec3;
 use lumbre_optics::LightKind;
@@ -12,10 +13,13 @@ use super::light_tree::{LightTree, has_position};
 use crate::scene::{BakeScene, PlacedLight};
 
 /// The sources of a scene.
+#[derive(Clone)]
 pub(crate) struct Sources<'a> {
     pub scene: &'a BakeScene,
-    pub emitters: Vec<Emitter>,
-    pub(crate) emitter_tree: EmitterTree,
+    pub emitters: Arc<[Emitter]>,
+    /// For each emitter the number of its lamp.
+    pub lamps: Arc<[u32]>,
+    pub(crate) emitter_tree: Arc<EmitterTree>,
     pub lights: Vec<PlacedLight>,
     pub(crate) light_tree: LightTree,
     /// Indices of the lights that are sampled individually everywhere: directional lights, and all lights if they are
@@ -33,27 +37,33 @@ pub(crate) const FEW_LIGHTS: usize = 16;
 impl<'a> Sources<'a> {
     /// Builds the trees over a scene's emissive triangles and punctual lights. `sky` is a radiance.
     pub fn new(scene: &'a BakeScene, emitters: Vec<Emitter>, lights: Vec<PlacedLight>, sky: Vec3) -> Self {
-        let emitter_tree = EmitterTree::new(&emitters, &lamps(scene, &emitters));
+        let lamps = lamps(scene, &emitters);
+        let emitter_tree = Arc::new(EmitterTree::new(&emitters, &lamps));
         let are_few = lights.len() <= FEW_LIGHTS;
         let shares_samples = |index: &u32| !are_few && has_position(&lights[*index as usize]);
         let (in_tree, individually_sampled_lights) = (0..lights.len() as u32).partition(shares_samples);
         let light_tree = LightTree::new(&lights, in_tree, scene.space);
-        Self { scene, emitters, emitter_tree, lights, light_tree, individually_sampled_lights, sky: sky * PI }
+        Self {
+            scene,
+            emitters: emitters.into(),
+            lamps: lamps.into(),
+            emitter_tree,
+            lights,
+            light_tree,
+            individually_sampled_lights,
+            sky: sky * PI,
+        }
     }
 
     /// Only the emissive triangles that `keep` accepts, without punctual lights and sky.
     pub fn only_emitters(&self, keep: impl Fn(&Emitter) -> bool) -> Self {
-        let emitters: Vec<Emitter> = self.emitters.iter().filter(|emitter| keep(emitter)).cloned().collect();
-        let emitter_tree = EmitterTree::new(&emitters, &lamps(self.scene, &emitters));
-        Self {
-            scene: self.scene,
-            emitters,
-            emitter_tree,
-            lights: Vec::new(),
-            light_tree: LightTree::default(),
-            individually_sampled_lights: Vec::new(),
-            sky: Vec3::ZERO,
+        let kept: Vec<Emitter> = self.emitters.iter().filter(|emitter| keep(emitter)).cloned().collect();
+        if kept.len() < self.emitters.len() {
+            return Self::new(self.scene, kept, Vec::new(), Vec3::ZERO);
         }
+        let (lights, individually_sampled_lights) = (Vec::new(), Vec::new());
+        let light_tree = LightTree::default();
+        Self { lights, light_tree, individually_sampled_lights, sky: Vec3::ZERO, ..self.clone() }
     }
 
     /// Whether there is no light source.

@@ -40,3 +40,28 @@ pub(crate) fn apparent_sine(center: Vec3, radius: f32, receiver: &Receiver, reac
 pub(crate) fn clamp_below_one(u: f32) -> f32 {
     u.clamp(0.0, 1.0 - f32::EPSILON)
 }
+
+/// Samples one of some weights by `u` in [0, 1): its index, its probability, and `u` rescaled from its interval to [0,
+/// 1). If the sum is zero or not finite, all have the same probability.
+#[inline(always)]
+pub(crate) fn pick(weights: &[f32], u: f32) -> (usize, f32, f32) {
+    let sum: f32 = weights.iter().sum();
+    if !(sum > 0.0 && sum.is_finite()) {
+        let along = u * weights.len() as f32;
+        let place = (along as usize).min(weights.len() - 1);
+        return (place, 1.0 / weights.len() as f32, clamp_below_one(along - place as f32));
+    }
+    let target = u * sum;
+    let (mut running, mut last) = (0.0, 0);
+    for (place, &weight) in weights.iter().enumerate() {
+        if target < running + weight {
+            return (place, weight / sum, clamp_below_one((target - running) / weight));
+        }
+        if weight > 0.0 {
+            last = place;
+        }
+        running += weight;
+    }
+    // Rounding put `target` beyond the end of the sums.
+    (last, weights[last] / sum, clamp_below_one(1.0))
+}

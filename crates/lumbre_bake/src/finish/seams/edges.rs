@@ -37,7 +37,7 @@ pub(crate) fn borders(scene: &BakeScene) -> Vec<Edge> {
             // Adding zero turns -0 into 0.
             let [u, v] = (triangle.uv[corner] + Vec2::ZERO).to_array().map(f32::to_bits);
             let next = corners.len() as u32;
-            *corners.entry([triangle.object, x, y, z, u, v]).or_insert(next)
+            *corners.entry([triangle.map.0, x, y, z, u, v]).or_insert(next)
         });
         for corner in 0..3 {
             let (from, to) = (ids[corner], ids[(corner + 1) % 3]);

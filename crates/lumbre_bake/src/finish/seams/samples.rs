@@ -121,8 +121,8 @@ impl Sampling<'_> {
             }
             let uv = [(long, s), (short, t)].map(|(edge, t)| edge.uv[0].lerp(edge.uv[1], t));
             let scene = self.texels.scene;
-            let objects = [long, short].map(|edge| scene.triangles[edge.triangle as usize].object);
-            if objects[0] == objects[1] && (uv[0] - uv[1]).abs().max_element() < SAME_READING {
+            let maps = [long, short].map(|edge| scene.triangles[edge.triangle as usize].map);
+            if maps[0] == maps[1] && (uv[0] - uv[1]).abs().max_element() < SAME_READING {
                 continue;
             }
             let (Some(long_reading), Some(short_reading)) =
@@ -146,20 +146,11 @@ impl Sampling<'_> {
     /// What bilinear filtering reads at a place of a map, if all its texels are known and none is another chart's.
     fn reading(&self, edge: &Edge, uv: Vec2) -> Option<Reading> {
         let triangle = &self.texels.scene.triangles[edge.triangle as usize];
-        let map = &self.texels.layout.maps[triangle.object as usize];
+        let map = &self.texels.layout.maps[triangle.map.place()];
         let chart = self.texels.charts[edge.triangle as usize];
-        let at = uv - 0.5;
-        let low = at.floor();
-        let fraction = at - low;
         let mut reading = Reading::default();
         let mut sum = 0.0;
-        for corner in 0..4 {
-            let step = Vec2::new((corner % 2) as f32, (corner / 2) as f32);
-            let share = (Vec2::ONE - step) * (Vec2::ONE - fraction) + step * fraction;
-            let weight = share.x * share.y;
-            // `as` saturates at 0: with the `min` below, coordinates are clamped to the border as a sampler does.
-            let (x, y) = ((low.x + step.x) as u32, (low.y + step.y) as u32);
-            let texel = map.texel(x.min(map.width - 1), y.min(map.height - 1));
+        for (corner, (texel, weight)) in map.bilinear(uv).into_iter().enumerate() {
             reading.texels[corner] = texel;
             if weight < NEGLIGIBLE {
                 continue;

@@ -12,7 +12,7 @@ pub(super) type Range = [Vec3; 2];
 
 /// Sums of samples of both bounds, for their means and standard errors.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Estimate {
+pub(super) struct ChangeSums {
     sums: [DVec3; 2],
     squares: [DVec3; 2],
     count: f64,
@@ -20,7 +20,7 @@ pub(super) struct Estimate {
     pub unknown: bool,
 }
 
-impl Estimate {
+impl ChangeSums {
     /// Adds a sample of both bounds.
     pub fn add(&mut self, range: Range, weight: f32) {
         for (bound, value) in range.into_iter().enumerate() {
