@@ -83,7 +83,7 @@ pub struct BakeOptions {
     /// The target: the relative RMSE that sampling may leave in the lightmap; positive. 0.01 is one per cent of the
     /// light around each texel. The final gather stops when its estimate reaches this, for the whole level and in
     /// every room's view, when the time is up, or, except in a final bake with a time limit, at the quality's limit of
-    /// rays.
+    /// rays, which is half as large again for views once the whole level has reached it.
     pub error: f64,
     /// Wall-clock time after which no more samples are taken; `None` for no limit. The map is complete all the same,
     /// only noisier. Its bits then depend on the machine's speed.
@@ -175,7 +175,7 @@ pub(crate) struct Effort {
     pub gather: [u32; 2],
     /// Limit for a bake's total, whatever error was requested (not of a final bake whose time is limited): most gather
     /// rays, and most samples of the sources that share them, per texel on average. The total may always be as large as
-    /// [`SMALL_BUDGET`].
+    /// [`SMALL_BUDGET`]. The gather may exceed it by a half for views whose error is larger than the whole level's.
     pub mean: u32,
 }
 

@@ -55,7 +55,11 @@ pub fn bake_arguments(options: &BakeOptions) -> String {
         Probes::Always => " --probes always",
         _ => "",
     };
-    format!("--error {}{density}{patches}{probes} --no-resolution-error --no-reuse", options.error)
+    // In an atlas, which the command line packs by default, maps are read at slightly different places.
+    format!(
+        "--error {}{density}{patches}{probes} --no-resolution-error --no-reuse --atlas-size 0",
+        options.error
+    )
 }
 
 /// Returns a sentence that says why a scene cannot be baked, or `None` if it can.
@@ -63,15 +67,18 @@ pub fn bake_arguments(options: &BakeOptions) -> String {
 /// # Errors
 /// [`CostError::Load`].
 pub fn nothing_to_bake(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Option<String>, CostError> {
-    let mut world = scene.open(conditions.aspect())?;
-    let name = &scene.name;
-    Ok(match (static_area(&mut world) > 0.0, has_light_to_bake(&mut world)) {
+    Ok(nothing_to_bake_in(&mut scene.open(conditions.aspect())?, &scene.name))
+}
+
+/// Returns a sentence that says why a World of this name cannot be baked, or `None` if it can.
+pub fn nothing_to_bake_in(world: &mut World, name: &str) -> Option<String> {
+    match (static_area(world) > 0.0, has_light_to_bake(world)) {
         (true, true) => None,
         (false, _) => Some(format!("Nothing in {name} is static, so there is nothing to bake.")),
         (_, false) => Some(format!(
             "{name} has no baked lights, no emission and no sky, so its lightmaps would be black."
         )),
-    })
+    }
 }
 
 /// Returns the area of everything that is baked, in square metres.

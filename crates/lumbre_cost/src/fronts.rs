@@ -143,6 +143,16 @@ mod tests {
     }
 
     #[test]
+    fn a_larger_error_never_counts_less() {
+        let error = |relative_rmse, uncertainty| {
+            ErrorOf { relative_rmse, uncertainty, ..ErrorOf::default() }.reached()
+        };
+        assert_eq!((error(0.0, 0.3), error(0.2, 0.0), error(0.9, 0.3)), (0.3, 0.2, 0.9));
+        let steps: Vec<f64> = (0..100).map(|step| error(0.01 * f64::from(step), 0.3)).collect();
+        assert!(steps.windows(2).all(|pair| pair[0] <= pair[1] && pair[1] - pair[0] < 0.011), "{steps:?}");
+    }
+
+    #[test]
     fn points_with_different_references_do_not_beat_each_other() {
         let point = |label: &str, ms: f64, error: f64, reference: &str| Point {
             label: label.into(),

@@ -125,12 +125,11 @@ impl ErrorOf {
     }
 
     /// Returns the error that can be relied on: the relative RMSE, or the most that it may be where the reference is
-    /// too uncertain to tell it from none.
+    /// too uncertain to tell it from none. In between, an error of less than twice its uncertainty counts as that
+    /// much, so that a larger error never counts less.
     pub fn reached(&self) -> f64 {
-        match self.is_below_uncertainty() {
-            true => self.relative_rmse + self.uncertainty,
-            false => self.relative_rmse,
-        }
+        let Self { relative_rmse, uncertainty, .. } = *self;
+        relative_rmse.max(uncertainty + relative_rmse.min(uncertainty))
     }
 }
 
@@ -202,7 +201,7 @@ pub enum Quantity {
     /// Median time in milliseconds.
     #[default]
     Milliseconds,
-    /// Relative RMSE.
+    /// Relative RMSE, as far as it can be relied on ([`ErrorOf::reached`]).
     Error,
     /// Mean of FLIP.
     Flip,
@@ -219,7 +218,7 @@ impl Quantity {
     pub fn of(&self, point: &Point) -> Option<f64> {
         match self {
             Self::Milliseconds => point.milliseconds.map(|time| time.median),
-            Self::Error => point.error.map(|error| error.relative_rmse),
+            Self::Error => point.error.map(|error| error.reached()),
             Self::Flip => point.error.and_then(|error| error.flip),
             Self::Parameter(name) => point.parameters.get(name).copied(),
             Self::Figure(name) => point.figures.get(name).copied(),

@@ -50,7 +50,7 @@ mod tests {
     use glam::{Vec2, Vec3};
     use lumbre_mesh::TriangleMesh;
 
-    use super::super::neighbours::tests::random;
+    use super::super::neighbours_tests::random;
     use super::super::replicates::{REPLICATES, mean, variance};
     use super::*;
     use crate::coverage::CoveredTexels;

@@ -31,7 +31,8 @@ use crate::{BakeError, BakeOptions, Ended, ErrorAtTime};
 /// When the quality's rays are spent, a small step may still be taken: a map that just misses the requested error helps
 /// nobody.
 const SMALL_STEP: f64 = 0.8;
-/// A small step may raise the total number of rays to this multiple of the quality's limit.
+/// A small step towards the requested error of the whole level may raise the total number of rays to this multiple of
+/// the quality's limit; one towards that of views stays within [`RAYS_FOR_VIEWS`].
 const SMALL_STEP_RAYS: f64 = 1.25;
 /// [`TARGET`] of a small step, per unit of the requested over the remaining squared error. It is closer to 1, as the
 /// outcome is predicted better the less a round has to reduce the error.
@@ -333,20 +334,19 @@ impl<'a> RoundPlanner<'a> {
         let requested = self.options.error.powi(2);
         let is_whole_reached = error.relative <= self.options.error;
         let of_quality = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
-        let limit = match is_whole_reached {
-            true => (of_quality as f64 * RAYS_FOR_VIEWS) as u64,
-            false => of_quality,
-        };
+        let [with_small_step, for_views] =
+            [SMALL_STEP_RAYS, RAYS_FOR_VIEWS].map(|times| (of_quality as f64 * times) as u64);
+        // Rays beyond a small step were cast for views: the mean had reached the request, and is near it still.
+        let limit = if is_whole_reached || cast > with_small_step { for_views } else { of_quality };
         let budget = limit.saturating_sub(cast);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let missed = if is_whole_reached { error.in_worst_view } else { error.relative };
         let requested_over_left = requested / missed.powi(2).max(f64::MIN_POSITIVE);
-        let is_small_step = is_spent && requested_over_left > SMALL_STEP;
+        let worthwhile = (WORTHWHILE * cast as f64) as u64;
+        let for_small_step = limit.max(with_small_step).saturating_sub(cast);
+        let is_small_step = is_spent && requested_over_left > SMALL_STEP && for_small_step >= worthwhile;
         let (first_target, budget) = match is_small_step {
-            true => {
-                let raised_limit = limit.max((of_quality as f64 * SMALL_STEP_RAYS) as u64);
-                (SMALL_STEP_TARGET * requested_over_left, raised_limit.saturating_sub(cast))
-            }
+            true => (SMALL_STEP_TARGET * requested_over_left, for_small_step),
             false => (TARGET, budget),
         };
         let allocate = |goal: &WeightedGoal, most: u64| {
@@ -356,7 +356,6 @@ impl<'a> RoundPlanner<'a> {
             let wanted = allocator.within(most, goal.sum);
             (allocator.added(&wanted), wanted)
         };
-        let worthwhile = (WORTHWHILE * cast as f64) as u64;
         let mut target = first_target;
         let (goal, (mut added, mut wanted)) = loop {
             // The mean over the level comes first: the rays may not suffice for every room.

@@ -48,6 +48,7 @@ pub fn points(study: &Study) -> Markup {
     let error = |point: &Point| {
         point.error.map_or(String::new(), |error| match error.uncertainty {
             0.0 => rounded(100.0 * error.relative_rmse),
+            _ if error.is_below_uncertainty() => format!("at most {}", rounded(100.0 * error.reached())),
             open => format!("{} ± {}", rounded(100.0 * error.relative_rmse), rounded(100.0 * open)),
         })
     };

@@ -21,7 +21,7 @@ use crate::measured::Measured;
 use crate::rounds::{Repeated, repeated};
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;
-use crate::{Conditions, CostError, Plot, Point, Quantity, Spread, Study};
+use crate::{Conditions, CostError, ErrorOf, Plot, Point, Quantity, Spread, Study};
 
 /// The requested errors.
 const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01];
@@ -40,7 +40,7 @@ const PATCH: &str = "texels along a patch";
 const ASKED: &str = "error asked for, %";
 const STATED: &str = "error stated, % of the mean";
 /// The statement that a request is about: the larger one of the whole level's error and that in its worst view.
-const STATED_IN_VIEW: &str = "error stated in the worst view, %";
+const STATED_AT_MOST: &str = "error stated, whole or in the worst view, %";
 const FOUND: &str = "error found, % of the mean";
 
 /// Runs the study.
@@ -184,7 +184,7 @@ fn of_scene(
         if asked.bounces {
             // A bake without bounces states the error of direct light, which is not the error found here.
             figures.push((STATED, 100.0 * report.error_of_mean));
-            figures.push((STATED_IN_VIEW, 100.0 * report.estimated_error.max(report.error_in_worst_view)));
+            figures.push((STATED_AT_MOST, 100.0 * report.estimated_error.max(report.error_in_worst_view)));
         }
         figures.extend(error.map(|error| (FOUND, 100.0 * error.relative_rmse)));
         let counts = [
@@ -282,26 +282,26 @@ fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
 
 /// Compares the errors that bakes state with those found, where the converged bake is exact enough to find them.
 fn of_statements(scene: &SceneFile, points: &[&Point]) -> String {
-    let found = |point: &&&Point| point.error.is_some_and(|error| !error.is_below_uncertainty());
-    let ratios: Vec<f64> = points
-        .iter()
-        .filter(found)
-        .filter_map(|point| {
-            Some(point.figures.get(FOUND)? / point.figures.get(STATED).filter(|stated| **stated > 0.0)?)
-        })
-        .collect();
-    let most = ratios.iter().copied().fold(0.0, f64::max);
+    let stated = |point: &Point| point.figures.get(STATED).copied().filter(|stated| *stated > 0.0);
+    let all: Vec<(f64, ErrorOf)> =
+        points.iter().filter_map(|point| Some((stated(point)?, point.error?))).collect();
+    let found: Vec<&(f64, ErrorOf)> = all.iter().filter(|(_, error)| !error.is_below_uncertainty()).collect();
+    let ratios: Vec<f64> = found.iter().map(|(stated, error)| 100.0 * error.relative_rmse / stated).collect();
+    let unknown = match all.len() - found.len() {
+        0 => String::new(),
+        count => format!(
+            " Of {count} of {} bakes the reference's own noise leaves only the most that the error may be.",
+            all.len()
+        ),
+    };
     match Spread::of(&ratios) {
         Some(ratio) => format!(
-            "The true error of a bake of the {} is {} times the stated one in the median, and {} times at most.",
+            "The true error of a bake of the {} is {} times the stated one in the median, and {} times at most.{unknown}",
             scene.name,
             rounded(ratio.median),
-            rounded(most)
+            rounded(ratios.iter().copied().fold(0.0, f64::max))
         ),
-        None => format!(
-            "The true errors of bakes of the {} are not known: the reference's own noise is as large as any difference from it.",
-            scene.name
-        ),
+        None => format!("The true errors of bakes of the {} are not known.{unknown}", scene.name),
     }
 }
 
@@ -310,14 +310,13 @@ fn of_missed_requests(points: &[&Point]) -> Option<String> {
     let finals = points.iter().filter(|point| point.series.starts_with("final"));
     let missed: Vec<String> = finals
         .filter_map(|point| {
-            let (stated, requested) = (point.figures.get(STATED_IN_VIEW)?, point.parameters.get(ASKED)?);
-            (stated > requested)
-                .then(|| format!("{} ({} in the worst view)", point.label, percent(stated / 100.0)))
+            let (stated, requested) = (point.figures.get(STATED_AT_MOST)?, point.parameters.get(ASKED)?);
+            (stated > requested).then(|| format!("{} ({} stated)", point.label, percent(stated / 100.0)))
         })
         .collect();
     let missed: Vec<&str> = missed.iter().map(String::as_str).collect();
     (!missed.is_empty()).then(|| {
-        format!("Requested and not reached, as every bake says of itself: {}.", listed(&missed, "and"))
+        format!("Requests that a bake did not reach in every view, and says so: {}.", listed(&missed, "and"))
     })
 }
 

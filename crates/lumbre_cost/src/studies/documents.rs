@@ -336,13 +336,16 @@ fn finding_of_solver(points: &[Point]) -> Option<String> {
     let known: Vec<(f64, f64)> = known.collect();
     let few = known.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let many = known.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(format!(
-        "The radiosity system of {} patches is solved after {} iterations, that of {} patches after {}.",
-        counted(few.0),
-        counted(few.1),
-        counted(many.0),
-        counted(many.1)
-    ))
+    let also = if few.1 == many.1 { "also " } else { "" };
+    (few.0 < many.0).then(|| {
+        format!(
+            "The solver needs {} iterations for the radiosity system of {} patches, and {also}{} for that of {}.",
+            counted(few.1),
+            counted(few.0),
+            counted(many.1),
+            counted(many.0)
+        )
+    })
 }
 
 /// Computes form factors of all pairs of patches in a cube.

@@ -155,7 +155,7 @@ fn study() -> Study {
         name: "reflection".into(),
         title: "Reflection models compared with Phong's".into(),
         question: "Blinn's half vector with Phong's exponent, with four times that exponent, with a matched exponent or with an energy-conserving lobe, and the microfacets of Torrance and Sparrow: how much do their highlights differ from Phong's, and do they cost more, as document [M] says of Blinn's model with Fresnel's term and geometric attenuation, which is that of Torrance and Sparrow here?".into(),
-        reference: "the same ball or sheet under Phong's model with the same exponent, lobe and light".into(),
+        reference: "the same ball or sheet under Phong's model with the same exponent and light; for energy-keeping lobes, whose exponent of Phong is a quarter of the half vector's, under energy-keeping Phong".into(),
         plots: vec![
             Plot {
                 title: "Difference from Phong's highlight".into(),
@@ -271,8 +271,9 @@ fn of_incidences(study: &Study) -> Option<String> {
         let errors: Vec<(f64, f64)> = errors_over(study, name_of(variant), INCIDENCE).collect();
         let ((_, first), (_, last)) = (errors.first()?, errors.last()?);
         let (at, most) = errors.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let against = if variant.lobe == Lobe::Bare { "" } else { ", against energy-keeping Phong," };
         Some(format!(
-            "{} from {} to {} (at most {}, at {at}°)",
+            "{}{against} from {} to {} (at most {}, at {at}°)",
             name_of(variant),
             percent(*first),
             percent(*last),
