@@ -54,7 +54,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
     let mut measured = over_scenes(conditions, study(), ("room", Air::Clear), |scene, told, measured| {
         of_scene(&smaller, scene, told, measured)
     })?;
-    let note = "The reference's own noise adds to the squares of all errors but those of paths, which are its own first paths and seem closer to it than they are. The findings take that into account; plots and tables show the plain differences.";
+    let note = "The reference's own noise adds to the squares of all errors but those of paths, which are its own first paths and seem closer to it than they are. The findings take that into account; plots and tables show the plain differences, with what that leaves open of them.";
     measured.study.notes.push(note.into());
     Ok(measured)
 }
@@ -167,6 +167,13 @@ fn of_scene(
             ..Point::default()
         };
         measured.add_picture(point, picture, &reference, ErrorOver::Picture)?;
+    }
+    for point in &mut measured.study.points[first..] {
+        let apart = from_all_light(point, open).zip(point.error);
+        if let Some((all_light, plain)) = apart.filter(|_| !point.series.starts_with(CUT)) {
+            let uncertainty = (plain.relative_rmse - all_light.relative_rmse).abs() + all_light.uncertainty;
+            point.error = Some(ErrorOf { uncertainty, ..plain });
+        }
     }
     let points: Vec<&Point> = measured.study.points[first..].iter().collect();
     let findings = findings(&points, &told_apart, open);
