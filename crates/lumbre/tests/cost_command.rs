@@ -37,7 +37,7 @@ fn a_small_report_and_what_changed_since() {
     let output = lumbre(&asked);
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(
-        stdout(&output).contains("Reflection models compared with Phong's (24 points"),
+        stdout(&output).contains("Reflection models compared with Phong's (28 points"),
         "{}",
         stdout(&output)
     );
