@@ -56,6 +56,25 @@ def sun(towards, light):
     return {"towards": towards, "light": light}
 
 
+LIGHTS = [
+    lamp((2.5, 5.0, 4.0), (0.5, 0.5, 0.45)),
+    sun((-0.5, 1.0, 0.25), (0.25, 0.25, 0.3)),
+]
+
+# What both scenes of glass have in common, besides their things; and the floor and the wall behind these.
+SETTING_OF_GLASS = {
+    "camera": {"eye": (0.25, 1.75, 7.0), "target": (0.0, 1.0, 0.0), "fov": 36.0},
+    "depth": 12,
+    "highlights": False,
+    "ambient": (0.1, 0.1, 0.1),
+    "background": (0.1, 0.15, 0.25),
+    "lights": LIGHTS,
+}
+BEHIND_GLASS = [
+    floor(32.0, matt((0.5, 0.5, 0.55))),
+    block((0.0, 1.625, -2.0), (5.0, 3.0, 0.25), matt((0.55, 0.5, 0.4))),
+]
+
 # `depth` is the number of mirrored and transmitted rays in succession. Without `highlights` no lamp makes any, since k_t L (t.v)^n has no
 # counterpart in POV-Ray. No two surfaces touch.
 SCENES = {
@@ -65,10 +84,7 @@ SCENES = {
         "highlights": True,
         "ambient": (0.1, 0.1, 0.12),
         "background": (0.1, 0.15, 0.25),
-        "lights": [
-            lamp((2.5, 5.0, 4.0), (0.5, 0.5, 0.45)),
-            sun((-0.5, 1.0, 0.25), (0.25, 0.25, 0.3)),
-        ],
+        "lights": LIGHTS,
         "things": [
             floor(32.0, matt((0.4, 0.4, 0.45), mirror=(0.3, 0.3, 0.3))),
             ball((-1.125, 1.0625, -0.25), 1.0, matt((0.05, 0.05, 0.05), 0.4, 60.0, mirror=(0.8, 0.75, 0.65))),
@@ -80,18 +96,9 @@ SCENES = {
         ],
     },
     "glass": {
-        "camera": {"eye": (0.25, 1.75, 7.0), "target": (0.0, 1.0, 0.0), "fov": 36.0},
-        "depth": 12,
-        "highlights": False,
-        "ambient": (0.1, 0.1, 0.1),
-        "background": (0.1, 0.15, 0.25),
-        "lights": [
-            lamp((2.5, 5.0, 4.0), (0.5, 0.5, 0.45)),
-            sun((-0.5, 1.0, 0.25), (0.25, 0.25, 0.3)),
-        ],
+        **SETTING_OF_GLASS,
         "things": [
-            floor(32.0, matt((0.5, 0.5, 0.55))),
-            block((0.0, 1.625, -2.0), (5.0, 3.0, 0.25), matt((0.55, 0.5, 0.4))),
+            *BEHIND_GLASS,
             ball((-1.25, 1.0625, 0.25), 0.9375, glass(1.5)),
             block((1.0, 0.875, 0.0), (1.25, 1.5, 1.25), glass(1.5, (0.5, 0.9, 0.7))),
             block((0.25, 1.0, 2.0), (1.5, 1.75, 0.0625), glass(1.33)),
@@ -101,18 +108,9 @@ SCENES = {
         ],
     },
     "nested": {
-        "camera": {"eye": (0.25, 1.75, 7.0), "target": (0.0, 1.0, 0.0), "fov": 36.0},
-        "depth": 12,
-        "highlights": False,
-        "ambient": (0.1, 0.1, 0.1),
-        "background": (0.1, 0.15, 0.25),
-        "lights": [
-            lamp((2.5, 5.0, 4.0), (0.5, 0.5, 0.45)),
-            sun((-0.5, 1.0, 0.25), (0.25, 0.25, 0.3)),
-        ],
+        **SETTING_OF_GLASS,
         "things": [
-            floor(32.0, matt((0.5, 0.5, 0.55))),
-            block((0.0, 1.625, -2.0), (5.0, 3.0, 0.25), matt((0.55, 0.5, 0.4))),
+            *BEHIND_GLASS,
             # Water in glass.
             ball((-1.25, 1.0625, 0.25), 0.9375, coated(1.5, (0.1, 0.1, 0.1))),
             ball((-1.125, 1.0, 0.25), 0.5, coated(1.33, (0.05, 0.05, 0.05), (0.3, 0.7, 0.9))),

@@ -334,16 +334,13 @@ impl<'a> RoundPlanner<'a> {
         let requested = self.options.error.powi(2);
         let is_whole_reached = error.relative <= self.options.error;
         let of_quality = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
-        let [with_small_step, for_views] =
-            [SMALL_STEP_RAYS, RAYS_FOR_VIEWS].map(|times| (of_quality as f64 * times) as u64);
-        // Rays beyond a small step were cast for views: the mean had reached the request, and is near it still.
-        let limit = if is_whole_reached || cast > with_small_step { for_views } else { of_quality };
+        let limit = sample_limit(of_quality, cast, is_whole_reached);
         let budget = limit.saturating_sub(cast);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let missed = if is_whole_reached { error.in_worst_view } else { error.relative };
         let requested_over_left = requested / missed.powi(2).max(f64::MIN_POSITIVE);
         let worthwhile = (WORTHWHILE * cast as f64) as u64;
-        let for_small_step = limit.max(with_small_step).saturating_sub(cast);
+        let for_small_step = limit.max(times(of_quality, SMALL_STEP_RAYS)).saturating_sub(cast);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP && for_small_step >= worthwhile;
         let (first_target, budget) = match is_small_step {
             true => (SMALL_STEP_TARGET * requested_over_left, for_small_step),
@@ -388,8 +385,35 @@ impl<'a> RoundPlanner<'a> {
     }
 }
 
+/// Most samples in all, given those of the quality and those that have been cast. More are allowed for views once the
+/// whole level has reached the requested error. Samples beyond a small step can only have been cast for views: the
+/// whole level had reached it then, and is near it still, so that the limit stays raised.
+fn sample_limit(of_quality: u64, cast: u64, is_whole_reached: bool) -> u64 {
+    match is_whole_reached || cast > times(of_quality, SMALL_STEP_RAYS) {
+        true => times(of_quality, RAYS_FOR_VIEWS),
+        false => of_quality,
+    }
+}
+
+/// A number of samples times a factor.
+fn times(samples: u64, factor: f64) -> u64 {
+    (samples as f64 * factor) as u64
+}
+
 /// The mean of each texel's replicates, minus the known bias of the patches that its rays read.
 fn without_patch_bias(estimates: &[Estimates], bias: &[PatchBias]) -> Vec<Vec3> {
     let unbiased = estimates.iter().zip(bias).map(|(e, bias)| (mean(e) - bias.correction).max(Vec3::ZERO));
     unbiased.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn views_get_half_as_many_samples_again_once_the_whole_level_has_its_error() {
+        assert_eq!([0, 990, 1250].map(|cast| sample_limit(1000, cast, false)), [1000; 3]);
+        assert_eq!([0, 990, 1400].map(|cast| sample_limit(1000, cast, true)), [1500; 3]);
+        assert_eq!(sample_limit(1000, 1400, false), 1500, "a limit that was raised stays so");
+    }
 }
