@@ -71,6 +71,9 @@ pub(crate) struct Draws {
     pub clustered_depths: Option<[f64; 2]>,
 }
 
+/// Chooses the shading of an object that is shaded by need, which is given by its slot.
+pub(crate) type ChooseShading<'a> = dyn FnMut(usize, &Object, ErrorBound) -> Shading + 'a;
+
 /// The objects in view, each with the pipeline that draws it.
 #[derive(Default)]
 pub(crate) struct VisibleObjects<'a> {
@@ -125,7 +128,7 @@ impl<'a> VisibleObjects<'a> {
         frame: &FrameFeatures,
         (format, samples): (wgpu::TextureFormat, u32),
         choose: &dyn Fn(PipelineKey) -> Option<PipelineKey>,
-        need: &mut dyn FnMut(usize, &Object, ErrorBound) -> Shading,
+        need: &mut ChooseShading<'_>,
     ) -> Self {
         let mut seen = Self::default();
         let planes = view.frustum(objects.origin);

@@ -11,15 +11,17 @@ use lumbre_optics::FlatRule;
 use lumbre_scene::{Census, SceneSettings};
 
 use crate::draws::{Batch, Draws};
-use crate::extract::{CameraView, LitPass, SceneLights};
+use crate::extract::{CameraView, LightSet, LitPass, SceneLights};
+use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
 use crate::frame_bindings::FrameBindings;
 use crate::frame_plan::{FramePlan, FrameShape};
+use crate::light_counter::CountedStages;
 use crate::mirror_views::MirrorView;
 use crate::shader::Feature;
 use crate::shading_need::ShadingNeeds;
 use crate::{
-    FrameOptions, FrameTarget, LitPasses, Measure, MissingPipelines, PassLights, Statistics, Viewport,
+    FrameOptions, FrameTarget, Gpu, LitPasses, Measure, MissingPipelines, PassLights, Statistics, Viewport,
 };
 
 /// What the shader variants and passes of a frame follow from.
@@ -125,6 +127,27 @@ impl Decisions {
 }
 
 impl Decision {
+    /// Decides the plan and the features of a frame from what the scene calls for. `needs_radiance` tells
+    /// whether one of its effects needs the radiance of the lit passes.
+    pub fn new(
+        (options, settings): (&FrameOptions, &SceneSettings),
+        facts: &SceneFacts,
+        lights: LightSet,
+        needs_radiance: bool,
+        (gpu, seen): (&Gpu, &Seen<'_>),
+    ) -> Self {
+        let plan = FramePlan::for_device(facts, options, needs_radiance, (gpu, seen.target, seen.exposure));
+        let half = plan.lit_format == wgpu::TextureFormat::Rgba16Float;
+        let ending = (plan.ending, seen.target.format, half);
+        let counted = match options.measure {
+            Measure::Lights => CountedStages::of(gpu).0,
+            _ => CountedStages::default(),
+        };
+        let features =
+            FrameFeatures { counted, ..FrameFeatures::new(options, settings, facts, lights, ending) };
+        Self { options: options.clone(), settings: *settings, plan, features }
+    }
+
     /// Returns what effects need to know about the frame.
     pub fn shape(&self, seen: &Seen<'_>) -> FrameShape {
         self.plan.shape(seen.target, self.options.display, seen.exposure)

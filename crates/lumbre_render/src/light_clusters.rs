@@ -2,8 +2,11 @@
 //! divided into tiles of pixels and slices of depth; each of these clusters has a list of the lights whose
 //! range reaches it, and a fragment evaluates only those. The lists are exact, not an approximation: a light
 //! that is missing from a cluster is 0 everywhere in it. They are built on the CPU for every frame in which
-//! something moved. The shader that reads them is shaders/light_clusters.wesl; the lists of whole objects are
-//! in `light_lists`, and what the cone of a spotlight does not touch is found by `light_cone`.
+//! something moved, slice by slice on all cores. The shader that reads them is shaders/light_clusters.wesl; the
+//! lists of whole objects are in `light_lists`, and what the cone of a spotlight does not touch is found by
+//! `light_cone`.
+
+use std::ops::Range;
 
 use glam::{DVec3, UVec3};
 
@@ -23,6 +26,9 @@ const MANY_ENTRIES: f64 = 3e6;
 const SAMPLED_LIGHTS: usize = 1000;
 /// Largest number of depth slices.
 const MAX_SLICES: f64 = 96.0;
+/// Slices are given to other cores in groups of at least this many estimated list entries. A group takes some
+/// 0.1 ms, which is several times what waking up another core takes.
+const ENTRIES_PER_TASK: f64 = 16_384.0;
 /// By how much a light's range is enlarged, relative to the range and to the distance from the origin of
 /// frame space. This covers the rounding of points, of the depth and of its logarithm on the device.
 const RANGE_MARGIN: f64 = 1e-4;
@@ -74,9 +80,43 @@ pub(crate) struct LightClusters {
     black: u32,
     spheres: Vec<ViewSphere>,
     cones: Vec<ViewCone>,
-    spans: Vec<Span>,
     rows: Vec<Edge>,
-    slices: Vec<[f64; 2]>,
+    /// The slices of depth that each sphere reaches.
+    reached: Vec<Range<usize>>,
+    /// For each slice, where the spheres that reach it begin in `reaching`; then the end of the last.
+    first_reaching: Vec<u32>,
+    /// Indices of spheres in ascending order, slice by slice.
+    reaching: Vec<u32>,
+    slices: Vec<SliceLists>,
+}
+
+/// The lists of the clusters in one slice of depth, and what is needed to build them.
+#[derive(Debug, Default)]
+struct SliceLists {
+    /// Of each class, the position in `words` at which the list of each tile begins.
+    offsets: [Vec<u32>; CLASSES],
+    /// Of each class, the lists, as `LightClusters::values` has them.
+    words: [Vec<u32>; CLASSES],
+    entries: usize,
+    spans: Vec<Span>,
+}
+
+/// Number of classes of lights.
+const CLASSES: usize = 3;
+
+/// What all slices are built from.
+struct Building<'a> {
+    spheres: &'a [ViewSphere],
+    cones: &'a [ViewCone],
+    /// The indices of the first sphere of each class, and the number of all spheres.
+    classes: [usize; CLASSES + 1],
+    rows: &'a [Edge],
+    axes: [Axis; 2],
+    depths: Depths,
+    first_reaching: &'a [u32],
+    reaching: &'a [u32],
+    /// Index of a black light of the first class.
+    black: u32,
 }
 
 /// A sphere in view space: x to the right, y downwards, depth along the line of sight.
@@ -104,6 +144,7 @@ struct ViewCone {
 /// A run of clusters of one row that a light reaches.
 #[derive(Clone, Copy, Debug)]
 struct Span {
+    /// Index of the first tile in its slice.
     first: u32,
     count: u32,
     light: u32,
@@ -154,7 +195,7 @@ impl LightClusters {
             }
             self.spheres.push(in_view);
         }
-        let (columns, rows, depths) = self.choose(view);
+        let ([columns, rows], depths, estimated_entries) = self.choose(view);
         self.grid.size = UVec3::new(columns.count, rows.count, depths.count);
         self.grid.depth_scale = depths.scale as f32;
         self.grid.depth_bias = depths.bias as f32;
@@ -162,27 +203,95 @@ impl LightClusters {
         self.grid.tiles_per_pixel = 1.0 / self.tile_side as f32;
         self.rows.clear();
         self.rows.extend((0..=rows.count).map(|row| Edge::new(&rows, row)));
-        self.slices.clear();
-        self.slices.extend((0..depths.count).map(|slice| depths.bounds(slice)));
-        let clusters = (columns.count * rows.count * depths.count) as usize;
+        self.black = saturated(classes[0].len());
         let first = classes[0].len();
         let second = first + classes[1].len();
-        let tables = [0, clusters + 1, 2 * (clusters + 1)];
-        self.entries = 0;
-        self.values.clear();
-        self.values.resize(3 * (clusters + 1), 0);
-        self.grid.shadowed_offsets = saturated(tables[1]);
-        self.grid.ranged_offsets = saturated(tables[2]);
-        self.black = saturated(first);
-        let axes = [&columns, &rows];
-        self.class(0..first, tables[0], clusters, axes, &depths, None);
-        self.class(first..second, tables[1], clusters, axes, &depths, Some(black));
+        self.find_reaching(&depths);
+        let slices = depths.count as usize;
+        if self.slices.len() < slices {
+            self.slices.resize_with(slices, SliceLists::default);
+        }
+        let building = Building {
+            spheres: &self.spheres,
+            cones: &self.cones,
+            classes: [0, first, second, self.spheres.len()],
+            rows: &self.rows,
+            axes: [columns, rows],
+            depths,
+            first_reaching: &self.first_reaching,
+            reaching: &self.reaching,
+            black: self.black,
+        };
+        let tasks = (estimated_entries / ENTRIES_PER_TASK) as usize;
+        let (lists, slices_per_task) = (&mut self.slices[..slices], slices.div_ceil(tasks.max(1)));
+        in_groups(lists, slices_per_task, 0, &|first, group: &mut [SliceLists]| {
+            group.iter_mut().zip(first..).for_each(|(lists, slice)| lists.build(slice, &building));
+        });
+        // Evaluating any light of a class is harmless: it adds nothing where it does not reach.
         let any = self.spheres.get(second).map_or(none, |sphere| sphere.light);
-        self.class(second..self.spheres.len(), tables[2], clusters, axes, &depths, Some(any));
+        self.join([self.black | self.black << 16, black, any]);
     }
 
-    /// Chooses the finest grid whose lists are not too long.
-    fn choose(&mut self, view: &ClusteredView) -> (Axis, Axis, Depths) {
+    /// Finds the spheres that reach each slice.
+    fn find_reaching(&mut self, depths: &Depths) {
+        let slices = depths.count as usize;
+        self.first_reaching.clear();
+        self.first_reaching.resize(slices + 1, 0);
+        self.reached.clear();
+        self.reached.extend(self.spheres.iter().map(
+            |sphere| match depths.span(sphere.depth, sphere.radius) {
+                Some([first, last]) => first as usize..last as usize + 1,
+                None => 0..0,
+            },
+        ));
+        // Turns numbers of spheres into ends, then fills each slice from its end, which turns ends into
+        // beginnings.
+        for reached in &self.reached {
+            self.first_reaching[reached.clone()].iter_mut().for_each(|count| *count += 1);
+        }
+        let mut end = 0;
+        for count in &mut self.first_reaching {
+            end += *count;
+            *count = end;
+        }
+        self.reaching.clear();
+        self.reaching.resize(end as usize, 0);
+        for (sphere, reached) in self.reached.iter().enumerate().rev() {
+            for begin in &mut self.first_reaching[reached.clone()] {
+                *begin -= 1;
+                self.reaching[*begin as usize] = saturated(sphere);
+            }
+        }
+    }
+
+    /// Joins the lists of all slices, each class followed by one of these words.
+    fn join(&mut self, last_words: [u32; CLASSES]) {
+        let slices = &self.slices[..self.grid.size.z as usize];
+        let clusters = (self.grid.size.x * self.grid.size.y * self.grid.size.z) as usize;
+        self.grid.shadowed_offsets = saturated(clusters + 1);
+        self.grid.ranged_offsets = saturated(2 * (clusters + 1));
+        self.entries = slices.iter().map(|lists| lists.entries).sum();
+        self.values.clear();
+        let words = slices.iter().flat_map(|lists| &lists.words).map(Vec::len).sum::<usize>() + CLASSES;
+        self.values.reserve(CLASSES * (clusters + 1) + words);
+        let mut begin = CLASSES * (clusters + 1);
+        for class in 0..CLASSES {
+            for lists in slices {
+                let before = saturated(begin);
+                self.values.extend(lists.offsets[class].iter().map(|offset| before.saturating_add(*offset)));
+                begin += lists.words[class].len();
+            }
+            self.values.push(saturated(begin));
+            begin += 1;
+        }
+        for (class, last) in last_words.into_iter().enumerate() {
+            slices.iter().for_each(|lists| self.values.extend_from_slice(&lists.words[class]));
+            self.values.push(last);
+        }
+    }
+
+    /// Chooses the finest grid whose lists are not too long, and estimates the number of their entries.
+    fn choose(&mut self, view: &ClusteredView) -> ([Axis; 2], Depths, f64) {
         let mut near = f64::INFINITY;
         let mut far = f64::NEG_INFINITY;
         for sphere in &self.spheres {
@@ -195,18 +304,18 @@ impl LightClusters {
             let axes = Axis::both(view, side);
             let depths = Depths::new(view, side, near, far);
             self.tile_side = side;
-            grid = Some((axes[0], axes[1], depths));
             let clusters = f64::from(axes[0].count) * f64::from(axes[1].count) * f64::from(depths.count);
             // The volume of a sphere is about half that of the cube around it.
-            if clusters <= MANY_CLUSTERS && 0.5 * self.cells(&axes, &depths) <= MANY_ENTRIES {
+            let entries = 0.5 * self.cells(&axes, &depths);
+            grid = Some((axes, depths, entries));
+            if clusters <= MANY_CLUSTERS && entries <= MANY_ENTRIES {
                 break;
             }
         }
         // If every tile would be too fine, the coarsest is taken.
         grid.unwrap_or_else(|| {
             self.tile_side = TILE_SIDES[TILE_SIDES.len() - 1];
-            let [columns, rows] = Axis::both(view, self.tile_side);
-            (columns, rows, Depths::new(view, self.tile_side, near, far))
+            (Axis::both(view, self.tile_side), Depths::new(view, self.tile_side, near, far), 0.0)
         })
     }
 
@@ -235,100 +344,132 @@ impl LightClusters {
         });
         cells.sum::<f64>() * count as f64 / sampled.max(1) as f64
     }
+}
 
-    /// Appends the lists of one class, whose offsets begin at `table`: in pairs without `any`, otherwise one
-    /// by one, followed by `any`, a light of the class for empty lists to read.
-    fn class(
-        &mut self,
-        lights: std::ops::Range<usize>,
-        table: usize,
-        clusters: usize,
-        [columns, rows]: [&Axis; 2],
-        depths: &Depths,
-        any: Option<u32>,
-    ) {
-        self.spans.clear();
-        for sphere in &self.spheres[lights] {
-            let Some([first, last]) = depths.span(sphere.depth, sphere.radius) else { continue };
-            for slice in first..=last {
-                let [near, far] = self.slices[slice as usize];
-                let Some(in_slice) = sphere.between(near, far) else { continue };
-                let Some([top, bottom]) = rows.span(in_slice.y, in_slice.depth, in_slice.radius) else {
-                    continue;
-                };
-                for row in top..=bottom {
-                    let edges = [self.rows[row as usize], self.rows[row as usize + 1]];
-                    let Some(in_row) = in_slice.in_row(edges) else { continue };
-                    let Some(mut reached) = columns.span(in_row.x, in_row.depth, in_row.radius) else {
-                        continue;
-                    };
-                    if let Some(cone) = self.cones.get(sphere.cone as usize) {
-                        let depths =
-                            [near.max(sphere.depth - sphere.radius), far.min(sphere.depth + sphere.radius)];
-                        let Some(narrowed) = cone.narrowed(reached, row, [columns, rows], depths) else {
-                            continue;
-                        };
-                        reached = narrowed;
-                    }
-                    let [left, right] = reached;
-                    let first = (slice * rows.count + row) * columns.count + left;
-                    let count = right - left + 1;
-                    self.spans.push(Span { first, count, light: sphere.light });
-                    self.entries += count as usize;
-                    for cluster in first..first + count {
-                        self.values[table + cluster as usize] += 1;
-                    }
-                }
+/// Calls `work` for groups of consecutive slices on all cores, with the number of each group's first slice.
+fn in_groups(
+    slices: &mut [SliceLists],
+    group: usize,
+    first: u32,
+    work: &(impl Fn(u32, &mut [SliceLists]) + Sync),
+) {
+    if slices.len() <= group {
+        return work(first, slices);
+    }
+    let half = slices.len() / 2;
+    let (before, after) = slices.split_at_mut(half);
+    let middle = first + saturated(half);
+    rayon::join(|| in_groups(before, group, first, work), || in_groups(after, group, middle, work));
+}
+
+impl SliceLists {
+    /// Builds the lists of a slice.
+    fn build(&mut self, slice: u32, from: &Building) {
+        self.entries = 0;
+        let reaching =
+            from.first_reaching[slice as usize] as usize..from.first_reaching[slice as usize + 1] as usize;
+        let mut reaching = &from.reaching[reaching];
+        for class in 0..CLASSES {
+            let end = saturated(from.classes[class + 1]);
+            let of_class;
+            (of_class, reaching) = reaching.split_at(reaching.partition_point(|sphere| *sphere < end));
+            self.find_spans(slice, of_class, from);
+            self.count(class, from);
+            match class {
+                0 => self.fill_pairs(from.black),
+                _ => self.fill(class),
             }
         }
-        let begin = self.values.len();
-        let Some(any) = any else { return self.fill_pairs(table, clusters, begin) };
-        self.fill(table, clusters, begin);
-        // Evaluating any light of the class is harmless: it adds nothing where it does not reach.
-        self.values.push(any);
+    }
+
+    /// Finds the spans of these spheres, which are given by their indices.
+    fn find_spans(&mut self, slice: u32, spheres: &[u32], from: &Building) {
+        let [columns, rows] = &from.axes;
+        let [near, far] = from.depths.bounds(slice);
+        self.spans.clear();
+        for sphere in spheres.iter().map(|sphere| &from.spheres[*sphere as usize]) {
+            let Some(in_slice) = sphere.between(near, far) else { continue };
+            let Some([top, bottom]) = rows.span(in_slice.y, in_slice.depth, in_slice.radius) else {
+                continue;
+            };
+            for row in top..=bottom {
+                let edges = [from.rows[row as usize], from.rows[row as usize + 1]];
+                let Some(in_row) = in_slice.in_row(edges) else { continue };
+                let Some(mut reached) = columns.span(in_row.x, in_row.depth, in_row.radius) else {
+                    continue;
+                };
+                if let Some(cone) = from.cones.get(sphere.cone as usize) {
+                    let depths =
+                        [near.max(sphere.depth - sphere.radius), far.min(sphere.depth + sphere.radius)];
+                    let Some(narrowed) = cone.narrowed(reached, row, [columns, rows], depths) else {
+                        continue;
+                    };
+                    reached = narrowed;
+                }
+                let [left, right] = reached;
+                let (first, count) = (row * columns.count + left, right - left + 1);
+                self.spans.push(Span { first, count, light: sphere.light });
+            }
+        }
+    }
+
+    /// Counts the lights of each tile.
+    fn count(&mut self, class: usize, from: &Building) {
+        let tiles = (from.axes[0].count * from.axes[1].count) as usize;
+        let lengths = &mut self.offsets[class];
+        lengths.clear();
+        lengths.resize(tiles, 0);
+        for span in &self.spans {
+            self.entries += span.count as usize;
+            lengths[span.tiles()].iter_mut().for_each(|length| *length += 1);
+        }
     }
 
     /// Writes the lists of the spans. Turns lengths into end offsets, then fills each list from its end,
     /// which turns the end offsets into begin offsets.
-    fn fill(&mut self, table: usize, clusters: usize, begin: usize) {
-        let mut end = begin;
-        for offset in &mut self.values[table..=table + clusters] {
-            end += *offset as usize;
-            *offset = saturated(end);
+    fn fill(&mut self, class: usize) {
+        let (offsets, words) = (&mut self.offsets[class], &mut self.words[class]);
+        let mut end = 0;
+        for offset in &mut *offsets {
+            end += *offset;
+            *offset = end;
         }
-        self.values.resize(end, 0);
+        words.clear();
+        words.resize(end as usize, 0);
         for span in self.spans.iter().rev() {
-            for cluster in span.first..span.first + span.count {
-                let offset = &mut self.values[table + cluster as usize];
+            for offset in &mut offsets[span.tiles()] {
                 *offset -= 1;
-                let place = *offset as usize;
-                self.values[place] = span.light;
+                words[*offset as usize] = span.light;
             }
         }
     }
 
-    /// Like `fill`, with two lights per word. A list of odd length ends in a black light.
-    fn fill_pairs(&mut self, table: usize, clusters: usize, begin: usize) {
-        let black = self.black | self.black << 16;
-        let mut end = begin;
-        for offset in &mut self.values[table..=table + clusters] {
-            let length = *offset as usize;
-            *offset = saturated(2 * end + length);
+    /// Like `fill`, for the first class, with two lights per word. A list of odd length ends in a black light.
+    fn fill_pairs(&mut self, black: u32) {
+        let (offsets, words) = (&mut self.offsets[0], &mut self.words[0]);
+        let mut end = 0;
+        for offset in &mut *offsets {
+            let length = *offset;
+            *offset = 2 * end + length;
             end += length.div_ceil(2);
         }
-        // One more word, for an empty list to read.
-        self.values.resize(end + 1, black);
+        words.clear();
+        words.resize(end as usize, black | black << 16);
         for span in self.spans.iter().rev() {
-            for cluster in span.first..span.first + span.count {
-                let offset = &mut self.values[table + cluster as usize];
+            for offset in &mut offsets[span.tiles()] {
                 *offset -= 1;
                 let (word, half) = ((*offset / 2) as usize, 16 * (*offset % 2));
-                self.values[word] = self.values[word] & !(0xffff << half) | span.light << half;
+                words[word] = words[word] & !(0xffff << half) | span.light << half;
             }
         }
-        for offset in &mut self.values[table..=table + clusters] {
-            *offset /= 2;
-        }
+        offsets.iter_mut().for_each(|offset| *offset /= 2);
+    }
+}
+
+impl Span {
+    /// Returns the indices of its tiles in the slice.
+    fn tiles(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
     }
 }
 

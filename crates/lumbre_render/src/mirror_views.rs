@@ -8,10 +8,14 @@
 //! ```
 
 use glam::{DVec4, Vec3};
+use lumbre_scene::SceneSettings;
 
-use crate::draws::Draws;
+use crate::FrameOptions;
+use crate::draws::{Draws, VisibleObjects};
 use crate::extract::{CameraView, MirrorData, MirrorSurface, Object, Objects, Window};
 use crate::frame_plan::MirrorShape;
+use crate::layout::radiance;
+use crate::light_lists::ObjectLightLists;
 
 /// Largest number of views in mirrors in a frame.
 pub(crate) const MAX_VIEWS: usize = 16;
@@ -54,6 +58,16 @@ pub(crate) struct MirrorLook {
     pub refraction: bool,
     /// Background radiance.
     pub background: Vec3,
+}
+
+impl MirrorLook {
+    pub fn new(settings: &SceneSettings, options: &FrameOptions) -> Self {
+        Self {
+            two_sided: settings.two_sided,
+            refraction: options.refraction,
+            background: radiance(SceneSettings::shown_background(settings)),
+        }
+    }
 }
 
 /// A plane of mirrors that a view sees.
@@ -162,4 +176,21 @@ fn is_same_plane(a: DVec4, b: DVec4, object: &Object) -> bool {
     a.truncate().dot(b.truncate()) > 0.0
         && a.truncate().cross(b.truncate()).length() < SAME_DIRECTION
         && apart < SAME_PLACE * (1.0 + object.radius)
+}
+
+/// Finds what is drawn in the views. `visible` returns what a view shows but for these mirrors, which are the
+/// view's own, and `first_instance` is the number of instances of the frame before them.
+pub(crate) fn draw_mirrors<'a>(
+    views: &mut [MirrorView],
+    first_instance: usize,
+    lists: &mut ObjectLightLists,
+    mut visible: impl FnMut(&CameraView, &[usize]) -> VisibleObjects<'a>,
+) {
+    let mut instances = first_instance;
+    for view in views {
+        let own: Vec<usize> = view.mirrors.iter().map(|surface| surface.slot).collect();
+        let first = u32::try_from(instances).unwrap_or(u32::MAX);
+        view.draws = Draws::new(visible(&view.view, &own), lists, first);
+        instances += view.draws.instances.len();
+    }
 }

@@ -11,7 +11,7 @@ use lumbre_optics::{ErrorBound, Shading};
 use lumbre_scene::{SceneSettings, ShadowFilter, propagate_transforms};
 
 use crate::accounting::FrameShares;
-use crate::draws::{Draws, VisibleObjects};
+use crate::draws::{ChooseShading, Draws, VisibleObjects};
 use crate::effect_shares::EffectShares;
 use crate::effects::{self, BuiltIn, Effect, Stage};
 use crate::extract::{
@@ -22,7 +22,7 @@ use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
 use crate::frame_decision::{AskedFrame, Decided, Decision, Decisions, LastFrame, Seen, with_camera};
 use crate::frame_graph::{Last, Overlay, run_graph};
-use crate::frame_plan::{Ending, FramePlan, ShadowAtlas};
+use crate::frame_plan::{Ending, ShadowAtlas};
 use crate::frame_scene::{FrameScene, SHAPE};
 use crate::growable_buffer::GrowableBuffer;
 use crate::irradiance_volumes::IrradianceVolumes;
@@ -32,7 +32,7 @@ use crate::light_clusters::ClusteredView;
 use crate::light_counter::{CountedStages, LightCounter};
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::{Attribute, MeshBuffers};
-use crate::mirror_views::{MirrorLook, MirrorView, mirror_views};
+use crate::mirror_views::{MirrorLook, MirrorView, draw_mirrors, mirror_views};
 use crate::pipelines::{PipelineKey, Pipelines, attributes, is_flat};
 use crate::shader::Variant;
 use crate::shading_by_need::{Conditions, ShadingByNeed, SizedView, is_shaded_by_need};
@@ -418,16 +418,7 @@ impl Renderer {
             place,
             left_out,
         )?;
-        if !options.lightmaps {
-            lights.set = lights.set.without_lightmaps();
-            lights.reaches.iter_mut().for_each(|reach| reach.baked = false);
-            lights.lamps.iter_mut().for_each(|lamp| lamp.reach.baked = false);
-        }
-        if !options.shadows {
-            lights.set = lights.set.without_shadows();
-            lights.shadows.clear();
-            lights.lamps.iter_mut().for_each(|lamp| lamp.light.shadow = false);
-        }
+        lights.limit_to(options.lightmaps, options.shadows);
         clock.lap(|cpu| &mut cpu.lights_ms);
         let device = (self.gpu.is_software(), [seen.target.width, seen.target.height]);
         let (objects, volumes) = (&self.objects.census, self.volumes.len());
@@ -445,23 +436,7 @@ impl Renderer {
         let needs_radiance = called().any(|(effect, _)| effect.needs_radiance());
         let draws_objects = called().any(|(effect, _)| effect.draws_objects());
         let decision = former.cloned().unwrap_or_else(|| {
-            let plan = FramePlan::for_device(
-                &facts,
-                options,
-                needs_radiance,
-                (&self.gpu, seen.target, seen.exposure),
-            );
-            let half = plan.lit_format == wgpu::TextureFormat::Rgba16Float;
-            let ending = (plan.ending, seen.target.format, half);
-            let counted = match options.measure {
-                Measure::Lights => CountedStages::of(&self.gpu).0,
-                _ => CountedStages::default(),
-            };
-            let features = FrameFeatures {
-                counted,
-                ..FrameFeatures::new(options, settings, &facts, lights.set, ending)
-            };
-            Decision { options: options.clone(), settings: *settings, plan, features }
+            Decision::new((options, settings), &facts, lights.set, needs_radiance, (&self.gpu, seen))
         });
         if decision.plan.ending == Ending::DisplayPass
             && !self.effects.iter().any(|effect| effect.stage() == Stage::Display)
@@ -498,44 +473,31 @@ impl Renderer {
             shading_by_need.add(&chosen);
             chosen.shading
         };
-        let visible = VisibleObjects::new(
-            (&self.objects, &self.volumes),
-            (&seen.view, &[]),
-            settings,
-            &decision.features,
-            (decision.plan.lit_format, decision.plan.samples),
-            &choose,
-            &mut need,
-        );
+        let visible_in =
+            |seen: (&CameraView, &[usize]), features: &FrameFeatures, need: &mut ChooseShading<'_>| {
+                let format = (decision.plan.lit_format, decision.plan.samples);
+                VisibleObjects::new(
+                    (&self.objects, &self.volumes),
+                    seen,
+                    settings,
+                    features,
+                    format,
+                    &choose,
+                    need,
+                )
+            };
+        let visible = visible_in((&seen.view, &[]), &decision.features, &mut need);
         clock.lap(|cpu| &mut cpu.visibility_ms);
         let draws = Draws::new(visible, &mut lists, 0);
         let mut mirrors = Vec::new();
         if facts.calls_for_mirrors(options) && decision.plan.ending == Ending::DisplayPass {
-            let look = MirrorLook {
-                two_sided: settings.two_sided,
-                refraction: options.refraction,
-                background: radiance(SceneSettings::shown_background(settings)),
-            };
+            let look = MirrorLook::new(settings, options);
             mirrors = mirror_views(&self.objects, &seen.view, look, options.mirror_depth, left_out);
-            // Lights are counted only in passes that have a row in the account.
-            let counted = CountedStages::default();
-            let features = FrameFeatures { counted, g_buffer: None, ..decision.features };
-            let mut instances = draws.instances.len();
-            for mirror in &mut mirrors {
-                let own: Vec<usize> = mirror.mirrors.iter().map(|surface| surface.slot).collect();
-                let visible = VisibleObjects::new(
-                    (&self.objects, &self.volumes),
-                    (&mirror.view, &own),
-                    settings,
-                    &features,
-                    (decision.plan.lit_format, decision.plan.samples),
-                    &choose,
-                    &mut |_, _, _| Shading::Phong,
-                );
-                let first = u32::try_from(instances).unwrap_or(u32::MAX);
-                mirror.draws = Draws::new(visible, &mut lists, first);
-                instances += mirror.draws.instances.len();
-            }
+            let features = decision.features.in_mirrors();
+            let phong = &mut |_: usize, _: &Object, _: ErrorBound| Shading::Phong;
+            draw_mirrors(&mut mirrors, draws.instances.len(), &mut lists, |view, mirrors| {
+                visible_in((view, mirrors), &features, phong)
+            });
         }
         lists.check()?;
         clock.lap(|cpu| &mut cpu.draws_ms);

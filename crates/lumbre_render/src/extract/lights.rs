@@ -378,6 +378,22 @@ pub(crate) struct SceneLights {
     pub lamps: Vec<Lamp>,
 }
 
+impl SceneLights {
+    /// Leaves out what a frame without lightmaps or without shadows does not distinguish.
+    pub fn limit_to(&mut self, lightmaps: bool, shadows: bool) {
+        if !lightmaps {
+            self.set = self.set.without_lightmaps();
+            self.reaches.iter_mut().for_each(|reach| reach.baked = false);
+            self.lamps.iter_mut().for_each(|lamp| lamp.reach.baked = false);
+        }
+        if !shadows {
+            self.set = self.set.without_shadows();
+            self.shadows.clear();
+            self.lamps.iter_mut().for_each(|lamp| lamp.light.shadow = false);
+        }
+    }
+}
+
 /// How the lights of a frame are extracted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightPlace<'a> {

@@ -54,6 +54,12 @@ pub(crate) struct FrameFeatures {
 }
 
 impl FrameFeatures {
+    /// Returns the features of views in mirrors. Lights are counted only in passes that have a row in the
+    /// account.
+    pub fn in_mirrors(&self) -> Self {
+        Self { counted: CountedStages::default(), g_buffer: None, ..*self }
+    }
+
     /// Derives the features from options and settings, for a frame with these facts and lights and this
     /// ending, in a target of this format. `half` is true if its radiance is kept in half floats.
     pub fn new(
