@@ -1,5 +1,5 @@
 //! Measures the memory that a bake of many patches uses: `peak_memory TRIANGLES_ALONG_A_WALL MAP_SIZE [--memory BYTES]
-//! [--final]`. It reports the stages as they begin and prints, as JSON, the estimate, the peak memory of the process
+//! [--final] [--glowing]`; with `--glowing` every triangle of the walls emits light. It reports the stages as they begin and prints, as JSON, the estimate, the peak memory of the process
 //! (VmHWM on Linux) before and after the bake, and the patches.
 
 use std::error::Error;
@@ -16,7 +16,7 @@ use lumbre_optics::{Material, Surface};
 use lumbre_scene::{Mesh, StaticObject};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut numbers = Vec::new();
+    let (mut numbers, mut glow) = (Vec::new(), 0.0);
     let mut options =
         BakeOptions { quality: Quality::Draft, error: 0.5, threads: Some(2), ..BakeOptions::default() };
     let mut arguments = std::env::args().skip(1);
@@ -24,13 +24,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         match argument.as_str() {
             "--memory" => options.memory = Some(arguments.next().ok_or("--memory needs bytes")?.parse()?),
             "--final" => options.quality = Quality::Final,
+            "--glowing" => glow = 0.1,
             _ => numbers.push(argument.parse::<u32>()?),
         }
     }
     let [along, side] = numbers[..] else { return Err("give triangles along a wall and a map size".into()) };
     options.density = Density::MapSize(side);
     let mut world = World::new();
-    world.spawn((Mesh(Arc::new(room(along))), Material::matt(Vec3::splat(0.6)), StaticObject));
+    let mut walls = Material::matt(Vec3::splat(0.6));
+    walls.front.emission = Vec3::splat(glow);
+    world.spawn((Mesh(Arc::new(room(along))), walls, StaticObject));
     let lamp = Surface { emission: Vec3::splat(10.0), ..Surface::default() };
     let mut panel = TriangleMesh::default();
     wall(&mut panel, 1, Vec3::new(-0.3, 0.9, -0.3), [Vec3::X * 0.6, Vec3::Z * 0.6], Vec2::ZERO, 1.0);

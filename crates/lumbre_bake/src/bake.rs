@@ -236,13 +236,15 @@ fn run(
         let why = "no surface emits, no light is static or mixed, and there is no sky";
         return Ok(BakedScene::dark(why, triangles, notes));
     }
-    memory::check_texels(&scene, &layout, plan.sample_bytes, options)?;
+    memory::check_texels(&sources, &layout, plan.sample_bytes, options)?;
 
     monitor.stage(Stage::DirectLight)?;
     let texels = notes.noted(CoveredTexels::new(&scene, &layout, monitor)?);
-    let patch_resolution = notes.noted(patch_resolution(&texels, plan.sample_bytes, options, monitor)?);
+    let patch_resolution =
+        notes.noted(patch_resolution(&sources, &texels, plan.sample_bytes, options, monitor)?);
     let known = rebake.known_direct_light(&sources, &texels, monitor)?;
     let direct = notes.noted(direct_light(&sources, &texels, &known, options, monitor)?);
+    drop(known);
 
     let bounces = bounces(&sources, &texels, &direct, &patch_resolution, rebake, options, monitor)?;
     let Bounces { indirect, cache, exchanged, gathered } = notes.noted(bounces);
@@ -267,7 +269,13 @@ fn run(
     let figures = LightFigures { patch_resolution, exchanged, gathered, volume: volume.as_ref() };
     let mut report = BakeReport { triangles, ..BakeReport::default() };
     summary::write_light(&lit, figures, &input.objects, options, monitor, &mut report)?;
-    rebake.record(&lit, &sources, cache.as_ref().map(|cache| &cache.exchange), &report, monitor)?;
+    rebake.keep_for_next_bake(
+        &lit,
+        &sources,
+        cache.as_ref().map(|cache| &cache.exchange),
+        &report,
+        monitor,
+    )?;
     let filled = filled_maps(&lit, options.gap, monitor)?;
 
     monitor.stage(Stage::Seams)?;
@@ -282,6 +290,7 @@ fn run(
 /// How finely light is exchanged: as the quality and the memory allow, and coarser if time is short, so that most of it
 /// is left for the final gather.
 fn patch_resolution(
+    sources: &Sources<'_>,
     texels: &CoveredTexels<'_>,
     sample_bytes: u64,
     options: &BakeOptions,
@@ -289,7 +298,7 @@ fn patch_resolution(
 ) -> Result<(PatchResolution, StageNotes), BakeError> {
     let is_time_short = monitor.clock().is_past(SHORT_OF_TIME);
     let options = options.for_patches(decide(monitor, is_time_short)?);
-    monitor.run_interruptible(1.0, || memory::patch_resolution(texels, sample_bytes, &options))?
+    monitor.run_interruptible(1.0, || memory::patch_resolution(sources, texels, sample_bytes, &options))?
 }
 
 /// The light by bounces of all covered texels.

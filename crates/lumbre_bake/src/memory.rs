@@ -11,8 +11,8 @@ use crate::error::mebibytes;
 use crate::final_gather::{GatherSums, TexelRadiance};
 use crate::radiosity::{Patch, PatchResolution, Patches};
 use crate::report::StageNotes;
-use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
-use crate::sources::Direct;
+use crate::scene::{LightmapLayout, SceneTriangle};
+use crate::sources::{Direct, Sources};
 use crate::{BakeError, BakeOptions};
 
 /// Per triangle of the scene: the triangle itself; while the hierarchy is built, its corners without and with an index,
@@ -83,16 +83,17 @@ const OTHER_BYTES: u64 = 32 << 20;
 /// # Errors
 /// [`BakeError::Memory`].
 pub(crate) fn check_texels(
-    scene: &BakeScene,
+    sources: &Sources<'_>,
     layout: &LightmapLayout,
     sample_bytes: u64,
     options: &BakeOptions,
 ) -> Result<(), BakeError> {
     let Some(limit) = options.memory else { return Ok(()) };
+    let scene = sources.scene;
     let area = |t: &SceneTriangle| f64::from((t.uv[1] - t.uv[0]).perp_dot(t.uv[2] - t.uv[0]).abs()) / 2.0;
     let covered = scene.triangles.iter().map(area).sum::<f64>().min(layout.texels as f64) as u64;
     let texels = covered * (COVERED_TEXEL_BYTES + sample_bytes) + map_bytes(layout, options);
-    let needed = texels + scene.triangles.len() as u64 * TRIANGLE_BYTES + OTHER_BYTES;
+    let needed = texels + scene_bytes(sources) + OTHER_BYTES;
     if needed > limit {
         return Err(BakeError::Memory { needed, texels, covered, limit });
     }
@@ -105,6 +106,7 @@ pub(crate) fn check_texels(
 /// # Errors
 /// [`BakeError::Memory`] if even the coarsest resolution does not fit.
 pub(crate) fn patch_resolution(
+    sources: &Sources<'_>,
     texels: &CoveredTexels<'_>,
     sample_bytes: u64,
     options: &BakeOptions,
@@ -116,7 +118,6 @@ pub(crate) fn patch_resolution(
     let requested_rays = effort.form_factor_rays(texels.len(), options.error);
     let mut resolution =
         PatchResolution { patch_side: side, form_factor_rays: requested_rays, memory_bytes: 0 };
-    let triangles = scene.triangles.len() as u64;
     let covered = texels.len() as u64;
     let footprint_points = texels.iter().map(|texel| match &texel.footprint {
         Footprint::Points(points) => points.capacity() as u64,
@@ -129,8 +130,7 @@ pub(crate) fn patch_resolution(
     let requested_patches = Patches::count(scene, side);
     let (mut patches, mut is_coarsest) = (requested_patches, false);
     loop {
-        let needed =
-            texel_bytes + triangles * TRIANGLE_BYTES + OTHER_BYTES + exchange_bytes(&resolution, patches);
+        let needed = texel_bytes + scene_bytes(sources) + OTHER_BYTES + exchange_bytes(&resolution, patches);
         resolution.memory_bytes = needed;
         let Some(limit) = options.memory.filter(|&limit| needed > limit) else { break };
         if resolution.form_factor_rays > effort.form_factor_rays {
@@ -156,10 +156,16 @@ pub(crate) fn patch_resolution(
         ));
     }
     tracing::info!(
-        "this bake needs about {} at most: {covered} texels, {triangles} triangles, {patches} patches",
-        mebibytes(resolution.memory_bytes)
+        "this bake needs about {} at most: {covered} texels, {} triangles, {patches} patches",
+        mebibytes(resolution.memory_bytes),
+        scene.triangles.len()
     );
     Ok((resolution, notes))
+}
+
+/// Bytes for the scene and its emitters. A bake with probes may keep the emitters that light them in lists of their own.
+fn scene_bytes(sources: &Sources<'_>) -> u64 {
+    sources.scene.triangles.len() as u64 * TRIANGLE_BYTES + 2 * sources.emitter_bytes()
 }
 
 /// Bytes for the patches, their form factors and the sampling guide.

@@ -30,6 +30,20 @@ fn the_estimate_is_an_upper_bound_within_a_factor_of_four() {
 }
 
 #[test]
+fn the_estimate_counts_emitters() {
+    let measured = |arguments: &[&str]| {
+        let measured = peak_memory(arguments);
+        let number = |key: &str| measured[key].as_u64().unwrap();
+        assert!(number("after") - number("before") <= number("estimate"), "{measured}");
+        number("estimate")
+    };
+    let [dark, glowing] = [measured(&["60", "64"]), measured(&["60", "64", "--glowing"])];
+    // The corners of an emitter alone, in single and in double precision, take this many bytes.
+    let emitters = 6 * 2 * 60 * 60;
+    assert!(glowing - dark >= emitters * (36 + 72), "{dark}, {glowing}");
+}
+
+#[test]
 #[ignore = "slow: scripts/test --all runs it"]
 fn two_hundred_thousand_patches_fit_in_four_gibibytes() {
     let measured = peak_memory(&["130", "128", "--memory", "4294967296"]);

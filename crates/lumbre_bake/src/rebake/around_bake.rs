@@ -3,7 +3,7 @@
 //! what is kept: that is `choice`.
 
 use super::changes::Changes;
-use super::fingerprints::ObjectPrints;
+use super::fingerprints::ObjectFingerprints;
 use super::indirect_change;
 use super::samples::{Content, ObjectSamples, Samples, TexelSamples};
 use crate::content_hash::{ContentHash, Hashes, hashes_of};
@@ -137,7 +137,7 @@ impl<'a> Rebake<'a> {
 
     /// Takes down what was reused, and the samples for the next bake if they are requested. `exchange` is `None` where
     /// nothing bounces.
-    pub fn record(
+    pub fn keep_for_next_bake(
         &mut self,
         lit: &LitTexels<'_>,
         sources: &Sources<'_>,
@@ -172,7 +172,7 @@ impl<'a> Rebake<'a> {
         let prints = match &self.changes {
             Some(changes) => &changes.prints,
             None => {
-                new_prints = ObjectPrints::new(sources, texels);
+                new_prints = ObjectFingerprints::new(sources, texels);
                 &new_prints
             }
         };

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::changed_box::ChangedBox;
 use super::direct_light_invalidation::{ShadowVolumes, shadowed};
-use super::fingerprints::{ObjectPrints, fingerprint};
+use super::fingerprints::{ObjectFingerprints, fingerprint};
 use super::samples::{Content, ObjectSamples, TexelSamples};
 use crate::BakeOptions;
 use crate::content_hash::{ContentHash, Hashes};
@@ -78,7 +78,7 @@ fn count_missing<'h>(
 pub(crate) struct Changes<'a> {
     pub former: &'a Content,
     /// Of the new scene.
-    pub prints: ObjectPrints,
+    pub prints: ObjectFingerprints,
     /// Whether nothing differs, so that everything is kept as it is.
     pub nothing_changed: bool,
     /// Per object, whether it is new or has changed.
@@ -106,7 +106,7 @@ impl<'a> Changes<'a> {
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
     ) -> Self {
-        let prints = ObjectPrints::new(sources, texels);
+        let prints = ObjectFingerprints::new(sources, texels);
         let mut by_hash: HashMap<ContentHash, Vec<&'a ObjectSamples>> = HashMap::new();
         // Lists are in reverse order, so that of several equal objects the first is popped first.
         for object in former.objects.iter().rev() {

@@ -9,7 +9,7 @@ use crate::sampling::hash;
 use crate::sources::Sources;
 
 /// What objects are compared by, per object.
-pub(super) struct ObjectPrints {
+pub(super) struct ObjectFingerprints {
     /// Bounding box, canonical units; empty for an object without triangles.
     pub bounds: Vec<Bounds<Vec3>>,
     /// Hash of its emitters; 0 if it has none.
@@ -20,7 +20,7 @@ pub(super) struct ObjectPrints {
     pub first_triangles: Vec<u32>,
 }
 
-impl ObjectPrints {
+impl ObjectFingerprints {
     pub fn new(sources: &Sources<'_>, texels: &CoveredTexels<'_>) -> Self {
         let first_triangles = first_triangles(texels);
         let emission = emission(sources, texels, &first_triangles);

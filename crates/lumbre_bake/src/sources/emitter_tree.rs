@@ -63,6 +63,12 @@ const NARROW: f32 = 0.02;
 const MAX_OPENED: usize = 64;
 
 impl EmitterTree {
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        let nodes = size_of_val(self.nodes.as_slice()) + size_of_val(self.bounds.as_slice());
+        (nodes + size_of_val(self.order.as_slice())) as u64 + self.walk.bytes()
+    }
+
     /// Builds the hierarchy; `lamps[i]` is the number of the lamp that emitter i belongs to.
     pub fn new(emitters: &[Emitter], lamps: &[u32]) -> Self {
         let capacity = 2 * emitters.len();

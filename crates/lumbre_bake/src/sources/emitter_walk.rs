@@ -45,6 +45,11 @@ pub(crate) struct EmitterChoice {
 }
 
 impl EmitterWalk {
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(self.wide_nodes.as_slice()) + size_of_val(self.next.as_slice())) as u64
+    }
+
     /// Widens a binary tree in which children follow their parents and the first node is the root.
     pub fn new(kinds: &[NodeKind], bounds: &[EmitterBounds]) -> Self {
         let mut emitters = vec![1u32; kinds.len()];

@@ -16,9 +16,9 @@ use crate::scene::{BakeScene, PlacedLight};
 #[derive(Clone)]
 pub(crate) struct Sources<'a> {
     pub scene: &'a BakeScene,
-    pub emitters: Arc<[Emitter]>,
+    pub emitters: Arc<Vec<Emitter>>,
     /// For each emitter the number of its lamp.
-    pub lamps: Arc<[u32]>,
+    pub lamps: Arc<Vec<u32>>,
     pub(crate) emitter_tree: Arc<EmitterTree>,
     pub lights: Vec<PlacedLight>,
     pub(crate) light_tree: LightTree,
@@ -45,8 +45,8 @@ impl<'a> Sources<'a> {
         let light_tree = LightTree::new(&lights, in_tree, scene.space);
         Self {
             scene,
-            emitters: emitters.into(),
-            lamps: lamps.into(),
+            emitters: Arc::new(emitters),
+            lamps: Arc::new(lamps),
             emitter_tree,
             lights,
             light_tree,
@@ -64,6 +64,12 @@ impl<'a> Sources<'a> {
         let (lights, individually_sampled_lights) = (Vec::new(), Vec::new());
         let light_tree = LightTree::default();
         Self { lights, light_tree, individually_sampled_lights, sky: Vec3::ZERO, ..self.clone() }
+    }
+
+    /// Bytes that the emitters and their tree take.
+    pub fn emitter_bytes(&self) -> u64 {
+        let lists = size_of_val(self.emitters.as_slice()) + size_of_val(self.lamps.as_slice());
+        lists as u64 + self.emitter_tree.bytes()
     }
 
     /// Whether there is no light source.
