@@ -33,7 +33,7 @@ const STRIDE: usize = 256;
 struct ViewData {
     /// Of an orthographic view, the transform of frame space to the coordinates of the map and its depth; of a
     /// perspective one its directions to the right, up and forward.
-    axes: [[f32; 4]; 4],
+    axes: [[f32; 4]; 3],
     /// Corner and side in the atlas, in texels; 0.
     tile: [f32; 4],
     /// Size of a texel in metres (in a perspective view at a distance of one metre), near plane or negative
@@ -76,7 +76,7 @@ impl ShadowedLightData {
                 }
             }
             ShadowKind::Cone | ShadowKind::Cascades => {
-                axes_or_corners.copy_from_slice(&axes[..3]);
+                axes_or_corners = axes;
             }
         }
         let kind = if kind == ShadowKind::Cube { 2.0 } else { 1.0 };
@@ -159,8 +159,9 @@ impl CasterPipelines {
 pub(crate) struct OnDevice {
     pub atlas: wgpu::Texture,
     pub atlas_view: wgpu::TextureView,
-    /// The planes of the maps.
+    /// The planes of the maps, if there are any; else a single texel.
     pub planes: wgpu::TextureView,
+    has_planes: bool,
     pub planes_group: Option<wgpu::BindGroup>,
     matrices: wgpu::Buffer,
     pub caster_group: Option<wgpu::BindGroup>,
@@ -276,8 +277,9 @@ impl ShadowMaps {
                 ShadowKind::Cascades => (map_from_clip * view.clip_from_frame).transpose(),
                 ShadowKind::Cone | ShadowKind::Cube => DMat4::from_mat3(DMat3::from_cols(right, up, forward)),
             };
+            let [x, y, z, _] = axes.as_mat4().to_cols_array_2d();
             data.push(ViewData {
-                axes: axes.as_mat4().to_cols_array_2d(),
+                axes: [x, y, z],
                 tile: place.map(|number| number as f32),
                 parameters: parameters.map(|number| number as f32),
             });
@@ -315,9 +317,10 @@ impl ShadowMaps {
         meshes: &mut MeshBuffers,
         layout: &wgpu::BindGroupLayout,
     ) -> Result<Uploads, RenderError> {
-        if self.device.as_ref().is_none_or(|device| device.atlas.width() != self.side) {
-            let side = self.side.min(gpu.device.limits().max_texture_dimension_2d);
-            self.device = Some(OnDevice::new(gpu, side));
+        let kept = self.device.as_ref().map(|device| (device.atlas.width(), device.has_planes));
+        let side = self.side.min(gpu.device.limits().max_texture_dimension_2d);
+        if kept != Some((side, self.planes)) {
+            self.device = Some(OnDevice::new(gpu, side, self.planes));
         }
         let shadows = self.views.pending_bytes() + self.lights.pending_bytes() + self.matrices.len() as u64;
         let mut uploads = Uploads { shadows, ..Uploads::default() };
@@ -576,7 +579,7 @@ fn planes_pipeline(
 }
 
 impl OnDevice {
-    fn new(gpu: &Gpu, side: u32) -> Self {
+    fn new(gpu: &Gpu, side: u32, has_planes: bool) -> Self {
         let device = &gpu.device;
         let atlas = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("shadow atlas"),
@@ -588,7 +591,8 @@ impl OnDevice {
             usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
             view_formats: &[],
         });
-        let side = side.div_ceil(BLOCK);
+        // Where no filter reads planes, there is still a texture to bind.
+        let side = if has_planes { side.div_ceil(BLOCK) } else { 1 };
         let planes = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("shadow planes"),
             size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 1 },
@@ -610,6 +614,7 @@ impl OnDevice {
             atlas,
             matrices,
             planes: planes.create_view(&Default::default()),
+            has_planes,
             planes_group: None,
             caster_group: None,
             receiver_group: None,
