@@ -91,7 +91,8 @@ fn any_light(random: &mut Random, world: &mut World) {
     let bake = if random.within(0.0, 1.0) < 0.3 { BakeMode::Static } else { BakeMode::Dynamic };
     let place = random.place(14.0) * DVec3::new(1.0, 0.2, 1.0) + DVec3::Y * 0.5;
     let aim = place + random.place(1.0);
-    let light = Light { ambient, specular, attenuation, spot: cone, bake, ..Light::point(color) };
+    let shadow = random.within(0.0, 1.0) < 0.05;
+    let light = Light { ambient, specular, attenuation, spot: cone, bake, shadow, ..Light::point(color) };
     world.spawn((light, Transform::from_translation(place).looking_at(aim, DVec3::Y)));
 }
 
