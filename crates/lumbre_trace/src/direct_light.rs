@@ -251,7 +251,11 @@ fn polygon_visibility(
                 continue;
             }
             let target = Target { distance, surface: Some(surface), glass: Glass::LetsThrough, bulbs: &[] };
-            let (visible, more) = transmittance(scene, &origin.towards(to / distance), &target, media);
+            let ray = origin.towards(to / distance);
+            let (mut visible, more) = transmittance(scene, &ray, &target, media);
+            if visible != DVec3::ZERO {
+                visible *= surface.uncovered_share(scene, &ray, distance);
+            }
             (sum, weight, rays) = (sum + visible * part, weight + part, rays + more);
         }
     }
