@@ -34,6 +34,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
     println!("{file}, 640 x 360, one thread: the tracer and the bare hierarchy");
     print("primary", rates.primary);
     print("shadow", rates.shadow);
+    print("… in reach", rates.shadow_in_reach);
     Ok(())
 }
 
@@ -47,7 +48,7 @@ fn print(kind: &str, found: RayRate) {
     let [tracer, hierarchy] = found.millions_per_second;
     let [met, met_bare] = found.met;
     println!(
-        "{kind:8} {:10} rays, {met} and {met_bare} met: {tracer:.2} and {hierarchy:.2} million a second, ratio {:.2}",
+        "{kind:10} {:10} rays, {met} and {met_bare} met: {tracer:.2} and {hierarchy:.2} million a second, ratio {:.2}",
         found.rays, found.ratio
     );
 }

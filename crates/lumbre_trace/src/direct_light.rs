@@ -9,7 +9,7 @@ use lumbre_optics::{
 };
 
 use crate::coplanar::EndSurface;
-use crate::geometry::SpaceRay;
+use crate::geometry::RayOrigin;
 use crate::medium::MediumStack;
 use crate::scene::{PlacedLight, Scene};
 use crate::shadow_ray::{Glass, Target, transmittance};
@@ -90,6 +90,7 @@ pub(crate) fn direct_light(
     };
     light.ambient = light.ambient_of_scene;
     let passing = object.transmission();
+    let origin = point.ray_origin();
     for (number, placed) in scene.lights.iter().enumerate() {
         let sample = evaluate_light(&placed.light, placed.position, placed.axis, point.position);
         if sample.attenuation * sample.spot == 0.0 || (indirect && placed.light.kind == LightKind::Ambient) {
@@ -126,7 +127,8 @@ pub(crate) fn direct_light(
                 glass: Glass::LetsThrough,
                 bulbs: &placed.bulbs,
             };
-            let (visible, rays) = transmittance(scene, &shadow_ray(point, sample.direction), &target, start);
+            let ray = origin.towards(sample.direction);
+            let (visible, rays) = transmittance(scene, &ray, &target, start);
             light.rays += rays;
             visible
         } else {
@@ -156,7 +158,7 @@ pub(crate) fn direct_light(
         }
         let mut visibility = DVec3::ONE;
         if lighting.shadows {
-            let (sum, rays) = polygon_visibility(scene, point, number, media);
+            let (sum, rays) = polygon_visibility(scene, point, &origin, number, media);
             light.rays += rays;
             visibility = sum;
         }
@@ -217,16 +219,12 @@ pub(crate) fn reach(placed: &PlacedLight, point: &SurfacePoint) -> f64 {
     }
 }
 
-/// Returns the ray from a point towards a light, with its origin offset to the light's side of the surface.
-pub(crate) fn shadow_ray(point: &SurfacePoint, direction: DVec3) -> SpaceRay {
-    SpaceRay::leaving(point.position, direction, point.geometric, point.extent)
-}
-
 /// Returns the visibility of a polygon: the mean transmittance to a grid of points on it, weighted by their
 /// light.
 fn polygon_visibility(
     scene: &Scene,
     point: &SurfacePoint,
+    origin: &RayOrigin,
     number: usize,
     media: &MediumStack,
 ) -> (DVec3, u32) {
@@ -253,7 +251,11 @@ fn polygon_visibility(
                 continue;
             }
             let target = Target { distance, surface: Some(surface), glass: Glass::LetsThrough, bulbs: &[] };
-            let (visible, more) = transmittance(scene, &shadow_ray(point, to / distance), &target, media);
+            let ray = origin.towards(to / distance);
+            let (mut visible, more) = transmittance(scene, &ray, &target, media);
+            if visible != DVec3::ZERO {
+                visible *= surface.uncovered_share(scene, &ray, distance);
+            }
             (sum, weight, rays) = (sum + visible * part, weight + part, rays + more);
         }
     }

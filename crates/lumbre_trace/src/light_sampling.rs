@@ -27,9 +27,9 @@ pub(crate) struct LightSampler {
     emitter_tree: EmitterTree,
     /// Indices of all lights, which are weighed one by one if there is no tree.
     lamps: Vec<usize>,
-    /// Indices of the lights that have a size, which rays may find.
+    /// Indices of the lights that have a size, which rays may find; of the distant ones alone if there is a tree.
     sized: Vec<usize>,
-    /// Selects a few lamps where there are more than [`FEW_LAMPS`].
+    /// Selects a few lamps, and finds those with a size along rays, where there are more than [`FEW_LAMPS`].
     tree: Option<LightTree>,
     /// Index of the emitter that each triangle of the scene is, by the triangle's index, or [`NO_EMITTER`];
     /// empty without emitters.
@@ -142,8 +142,10 @@ impl LightSampler {
         }
         let emitter_tree = EmitterTree::new(&bounds);
         let lamps: Vec<usize> = (0..scene.lights.len()).collect();
-        let sized = lamps.iter().copied().filter(|&number| has_size(&scene.lights[number].light)).collect();
         let tree = (scene.lights.len() > FEW_LAMPS).then(|| LightTree::new(scene));
+        let is_asked =
+            |light: &Light| has_size(light) && (tree.is_none() || light.kind == LightKind::Directional);
+        let sized = lamps.iter().copied().filter(|&number| is_asked(&scene.lights[number].light)).collect();
         Self { emitters, emitter_tree, emitter_of, lamps, sized, tree }
     }
 
@@ -156,7 +158,7 @@ impl LightSampler {
         numbers: DVec2,
     ) -> Option<LampSample> {
         let (asked, of_asked, choice) = match &self.tree {
-            Some(tree) => tree.few(scene, point.position, point.normal, choice)?,
+            Some(tree) => tree.few(point.position, point.normal, choice)?,
             None => (&self.lamps[..], 1.0, choice),
         };
         let (weights, total) = weighed(scene, asked, point.position, point.normal);
@@ -191,7 +193,7 @@ impl LightSampler {
     pub fn lamp_chance(&self, scene: &Scene, point: &SurfacePoint, lamp: usize) -> f64 {
         let (position, normal) = (point.position, point.normal);
         let asked = match &self.tree {
-            Some(tree) => tree.few_with(scene, lamp, position, normal),
+            Some(tree) => tree.few_with(lamp, position, normal),
             None => Some((&self.lamps[..], 1.0)),
         };
         let Some((asked, of_asked)) = asked else { return 0.0 };
@@ -202,7 +204,7 @@ impl LightSampler {
 
     /// Returns the lamps with a size that lie along a ray, whatever is in front of them.
     pub fn met(&self, scene: &Scene, origin: DVec3, direction: DVec3) -> SmallVec<[MetLamp; 2]> {
-        let met = |&number: &usize| {
+        let met = |number: usize| {
             let placed = &scene.lights[number];
             let cone = LampCone::new(placed, origin).filter(|cone| cone.holds(direction))?;
             let sample = evaluate_light(&placed.light, placed.position, placed.axis, origin);
@@ -212,7 +214,13 @@ impl LightSampler {
             let (distance, solid_angle) = (cone.reach(direction), cone.solid_angle());
             (strength > 0.0 && is_finite).then_some(MetLamp { number, radiance, distance, solid_angle })
         };
-        self.sized.iter().filter_map(met).collect()
+        let mut lamps: SmallVec<[MetLamp; 2]> = self.sized.iter().copied().filter_map(met).collect();
+        if let Some(tree) = &self.tree {
+            tree.along(origin, direction, |number| lamps.extend(met(number)));
+            // The order of the scene, in which their light is added up.
+            lamps.sort_unstable_by_key(|lamp| lamp.number);
+        }
+        lamps
     }
 
     /// Samples a point on the emissive triangles for a surface point; `None` where the triangle's side emits
@@ -371,6 +379,43 @@ mod tests {
             }
             assert!(sized > 50, "{sized}");
         }
+    }
+
+    /// With the boxes around the lamps' centres alone this fails.
+    #[test]
+    fn the_tree_finds_the_lamps_with_a_size_along_a_ray() {
+        let scene = lamps(400);
+        let sampler = LightSampler::new(&scene);
+        assert!(sampler.tree.is_some());
+        let mut numbers = Numbers::new(9, 0, 1);
+        let (mut met_at_all, mut point) =
+            (0, || 2.0 * DVec3::new(numbers.next(), numbers.next(), numbers.next()) - 1.0);
+        for number in 0..4000 {
+            // From among the lamps and from afar, along an axis and in any direction.
+            let origin = point() * if number % 2 == 0 { 5.0 } else { 5000.0 };
+            let direction = match number % 3 {
+                0 => DVec3::AXES[number / 3 % 3] * -origin.signum(),
+                _ => 4.0 * point() - origin,
+            };
+            let direction = direction.normalize();
+            let met: Vec<usize> =
+                sampler.met(&scene, origin, direction).iter().map(|lamp| lamp.number).collect();
+            let along = |&lamp: &usize| {
+                let cone = LampCone::new(&scene.lights[lamp], origin);
+                let sample = evaluate_light(
+                    &scene.lights[lamp].light,
+                    scene.lights[lamp].position,
+                    scene.lights[lamp].axis,
+                    origin,
+                );
+                cone.is_some_and(|cone| cone.holds(direction)) && sample.attenuation * sample.spot > 0.0
+            };
+            let expected: Vec<usize> = (0..scene.lights.len()).filter(along).collect();
+            assert_eq!(met, expected, "from {origin} towards {direction}");
+            met_at_all +=
+                met.iter().filter(|&&lamp| scene.lights[lamp].light.kind == LightKind::Point).count();
+        }
+        assert!(met_at_all > 1000, "{met_at_all}");
     }
 
     #[test]

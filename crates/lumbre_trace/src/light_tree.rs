@@ -5,11 +5,14 @@
 //!
 //! The estimate of a box is above 0 wherever one of its lamps sends light, so that no light is left out; its
 //! accuracy affects the noise alone.
+//!
+//! The same boxes find the lamps with a size that a ray meets, without asking every lamp.
 
 use std::ops::Range;
 
 use glam::DVec3;
 use lumbre_optics::{Attenuation, Light, LightKind};
+use smallvec::SmallVec;
 
 use crate::metering::luminance;
 use crate::scene::Scene;
@@ -21,8 +24,12 @@ pub(crate) struct LightTree {
     boxes: Vec<LightBox>,
     /// Indices of the lamps, sorted so that every leaf's are together.
     lamps: Vec<usize>,
+    /// Place of every light in `lamps`, by the light's index; `None` for lights without a position.
+    places: Vec<Option<usize>>,
     /// Indices of the distant lights.
     distant: Vec<usize>,
+    /// Sum of their brightnesses.
+    distant_brightness: f64,
 }
 
 #[derive(Debug)]
@@ -35,8 +42,9 @@ struct LightBox {
     attenuation: Attenuation,
     /// Largest range of a lamp, metres.
     reach: f64,
-    /// Whether any lamp has a size, and may be seen above a horizon that hides its centre.
-    sized: bool,
+    /// Opposite corners of a box around the balls of the lamps that have a size, which may be seen above a horizon that
+    /// hides their centres; `None` if no lamp has one.
+    balls: Option<[DVec3; 2]>,
     /// Its lamps, in [`LightTree::lamps`].
     lamps: Range<usize>,
     /// The two boxes within it; `None` for a leaf.
@@ -54,14 +62,20 @@ impl LightTree {
             let lights = scene.lights.iter().enumerate();
             lights.filter(move |(_, placed)| placed.light.kind == kind).map(|(number, _)| number)
         };
+        let mut lamps: Vec<usize> = of_kind(LightKind::Point).collect();
+        let distant: Vec<usize> = of_kind(LightKind::Directional).collect();
         let mut tree = Self {
             boxes: Vec::new(),
-            lamps: of_kind(LightKind::Point).collect(),
-            distant: of_kind(LightKind::Directional).collect(),
+            lamps: Vec::new(),
+            places: vec![None; scene.lights.len()],
+            distant_brightness: distant.iter().map(|number| brightness(&scene.lights[*number].light)).sum(),
+            distant,
         };
-        let mut lamps = std::mem::take(&mut tree.lamps);
         if !lamps.is_empty() {
             tree.add(scene, &mut lamps, 0);
+        }
+        for (place, &lamp) in lamps.iter().enumerate() {
+            tree.places[lamp] = Some(place);
         }
         tree.lamps = lamps;
         tree
@@ -69,15 +83,9 @@ impl LightTree {
 
     /// Selects some lamps by `choice` in [0, 1). Returns them, the probability of selecting them, and an
     /// evenly distributed number that is left of `choice`; `None` where no lamp's light arrives.
-    pub fn few(
-        &self,
-        scene: &Scene,
-        point: DVec3,
-        normal: DVec3,
-        mut choice: f64,
-    ) -> Option<(&[usize], f64, f64)> {
+    pub fn few(&self, point: DVec3, normal: DVec3, mut choice: f64) -> Option<(&[usize], f64, f64)> {
         let mut chance = 1.0;
-        if take(&mut choice, &mut chance, self.share_of_distant(scene, point, normal)?) {
+        if take(&mut choice, &mut chance, self.share_of_distant(point, normal)?) {
             return Some((&self.distant, chance, choice));
         }
         let mut at = self.boxes.len().checked_sub(1)?;
@@ -90,18 +98,11 @@ impl LightTree {
 
     /// Returns the lamps among which [`few`](Self::few) selects a lamp, and the probability of that; `None` where
     /// it never does.
-    pub fn few_with(
-        &self,
-        scene: &Scene,
-        lamp: usize,
-        point: DVec3,
-        normal: DVec3,
-    ) -> Option<(&[usize], f64)> {
-        let distant = self.share_of_distant(scene, point, normal)?;
-        if self.distant.contains(&lamp) {
+    pub fn few_with(&self, lamp: usize, point: DVec3, normal: DVec3) -> Option<(&[usize], f64)> {
+        let distant = self.share_of_distant(point, normal)?;
+        let Some(place) = self.places[lamp] else {
             return Some((&self.distant, distant));
-        }
-        let place = self.lamps.iter().position(|&own| own == lamp)?;
+        };
         let mut chance = 1.0 - distant;
         let mut at = self.boxes.len().checked_sub(1)?;
         while let Some(next) = self.boxes[at].inside {
@@ -113,10 +114,26 @@ impl LightTree {
         Some((&self.lamps[self.boxes[at].lamps.clone()], chance))
     }
 
+    /// Calls `found` with every lamp with a size whose ball a ray may meet, and with some others.
+    pub fn along(&self, origin: DVec3, direction: DVec3, mut found: impl FnMut(usize)) {
+        let reciprocal = direction.recip();
+        let mut waiting: SmallVec<[usize; 32]> = self.boxes.len().checked_sub(1).into_iter().collect();
+        while let Some(at) = waiting.pop() {
+            let own = &self.boxes[at];
+            if !own.balls.is_some_and(|balls| meets(balls, origin, reciprocal)) {
+                continue;
+            }
+            match own.inside {
+                Some(inside) => waiting.extend(inside),
+                None => self.lamps[own.lamps.clone()].iter().for_each(|&lamp| found(lamp)),
+            }
+        }
+    }
+
     /// Returns the probability of the distant lights; `None` where no light arrives at all.
-    fn share_of_distant(&self, scene: &Scene, point: DVec3, normal: DVec3) -> Option<f64> {
+    fn share_of_distant(&self, point: DVec3, normal: DVec3) -> Option<f64> {
         let near = self.boxes.last().map_or(0.0, |root| root.brings(point, normal));
-        let far: f64 = self.distant.iter().map(|number| brightness(&scene.lights[*number].light)).sum();
+        let far = self.distant_brightness;
         (near + far > 0.0).then(|| far / (near + far))
     }
 
@@ -151,7 +168,7 @@ impl LightTree {
             brightness: lights().map(brightness).sum(),
             attenuation: Attenuation { range: f32::INFINITY, ..attenuation },
             reach: lights().map(|light| f64::from(light.attenuation.range)).fold(0.0, f64::max),
-            sized: lights().any(|light| light.radius > 0.0),
+            balls: box_of_balls(scene, lamps),
             lamps: first..first + lamps.len(),
             inside,
         });
@@ -176,10 +193,36 @@ impl LightBox {
             // angle.
             let spread = (radius / distance).asin();
             let angle = (normal.dot(to) / distance).clamp(-1.0, 1.0).acos();
-            cosine = (angle - spread).max(0.0).cos().max(if self.sized { BELOW_HORIZON } else { 0.0 });
+            cosine =
+                (angle - spread).max(0.0).cos().max(if self.balls.is_some() { BELOW_HORIZON } else { 0.0 });
         }
         self.brightness * cosine * self.attenuation.factor(distance.max(radius))
     }
+}
+
+/// Margin of the boxes around lamps for rounding, as a fraction of their largest coordinate.
+const MARGIN: f64 = 1e-9;
+
+/// Returns opposite corners of a box around the balls of those lamps that have a size.
+fn box_of_balls(scene: &Scene, lamps: &[usize]) -> Option<[DVec3; 2]> {
+    let placed = lamps.iter().map(|&number| &scene.lights[number]);
+    let sized = placed.filter(|placed| placed.light.radius > 0.0);
+    let corners = sized.map(|placed| {
+        let margin = MARGIN * placed.position.abs().max_element();
+        let radius = DVec3::splat(f64::from(placed.light.radius) * (1.0 + MARGIN) + margin);
+        [placed.position - radius, placed.position + radius]
+    });
+    corners.reduce(|[low, high], [own_low, own_high]| [low.min(own_low), high.max(own_high)])
+}
+
+/// Returns true if a ray meets a box. `reciprocal` is that of its direction, infinite along axes that it does not run
+/// along.
+fn meets([low, high]: [DVec3; 2], origin: DVec3, reciprocal: DVec3) -> bool {
+    let (to_low, to_high) = ((low - origin) * reciprocal, (high - origin) * reciprocal);
+    // 0 times infinity, where the origin lies in a side of the box, is not a number, which `min` and `max` pass over.
+    let enter = (0..3).fold(0.0_f64, |enter, axis| enter.max(to_low[axis].min(to_high[axis])));
+    let leave = (0..3).fold(f64::INFINITY, |leave, axis| leave.min(to_low[axis].max(to_high[axis])));
+    enter <= leave * (1.0 + MARGIN)
 }
 
 /// The brightness by which lamps are compared; 0 for a disabled lamp.

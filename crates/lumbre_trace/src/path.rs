@@ -13,9 +13,8 @@ use lumbre_optics::{apply_fog, fog_weight};
 
 use crate::camera_ray::{CameraRay, CameraRays};
 use crate::coplanar::{Layer, nearest_layers};
-use crate::direct_light::shadow_ray;
 use crate::film::Sample;
-use crate::geometry::{Place, SpaceRay};
+use crate::geometry::{Place, RayOrigin, SpaceRay};
 use crate::interface::RaySplit;
 use crate::light_sampling::{LightSampler, MetLamp, emitted};
 use crate::light_terms::{LightTerms, Source};
@@ -220,8 +219,9 @@ impl<'a> Paths<'a> {
         let lobes = Lobes::new(object.model, &point.surface, point.normal, viewer);
         let matt = !lobes.are_black() && point.normal.dot(viewer) > 0.0;
         let last = self.depth.is_some_and(|depth| walk.reflections >= depth);
+        let origin = point.ray_origin();
         if matt {
-            self.sample_lights(walk, point, &lobes, last, numbers);
+            self.sample_lights(walk, (point, &origin), &lobes, last, numbers);
         }
         // Light that goes straight through a thin sheet is not turned. Light sampling sees through sheets, and so must
         // what it is weighed against.
@@ -286,7 +286,7 @@ impl<'a> Paths<'a> {
         let chance = density * local / total;
         let scattering =
             Scattering { position: point.position, normal: point.normal, density: chance, distance: 0.0 };
-        let ray = shadow_ray(point, direction);
+        let ray = origin.towards(direction);
         self.meet_lamps(walk, &ray, |lamp| {
             let by_lights = self.lights.lamp_chance(scene, point, lamp.number) / lamp.solid_angle;
             chance / (chance + by_lights)
@@ -313,7 +313,7 @@ impl<'a> Paths<'a> {
     fn sample_lights(
         &self,
         walk: &mut Walk,
-        point: &SurfacePoint,
+        (point, origin): (&SurfacePoint, &RayOrigin),
         lobes: &Lobes,
         last: bool,
         numbers: &mut Numbers,
@@ -335,7 +335,7 @@ impl<'a> Paths<'a> {
             }
             let bulbs = &self.scene.lights[lamp.number].bulbs;
             let target = Target { distance: lamp.distance, surface: None, glass: Glass::OnlySheets, bulbs };
-            let seen = self.arriving(walk, &shadow_ray(point, direction), &target, reflected);
+            let seen = self.arriving(walk, &origin.towards(direction), &target, reflected);
             walk.brings(Source::Light(lamp.number), walk.reflections + 1, seen);
         }
         let (choice, place) = (numbers.next(), numbers.pair());
@@ -350,7 +350,7 @@ impl<'a> Paths<'a> {
                 glass: Glass::OnlySheets,
                 bulbs: &[],
             };
-            let seen = self.arriving(walk, &shadow_ray(point, direction), &target, reflected);
+            let seen = self.arriving(walk, &origin.towards(direction), &target, reflected);
             walk.brings(Source::Object(sample.surface.object), walk.reflections + 1, seen);
         }
     }

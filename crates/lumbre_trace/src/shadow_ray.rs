@@ -45,7 +45,7 @@ pub(crate) fn transmittance(
     target: &Target,
     media: &MediumStack,
 ) -> (DVec3, u32) {
-    let &Target { distance, surface, glass, bulbs } = target;
+    let &Target { distance, glass, bulbs, .. } = target;
     if bulbs.is_empty() && !scene.see_through && !scene.holes {
         let hidden = scene.geometry.anything_between(ray, distance);
         return (if hidden { DVec3::ZERO } else { media.transmittance(distance) }, 1);
@@ -70,6 +70,19 @@ pub(crate) fn transmittance(
     if !through.get() {
         return (media.transmittance(distance), 1);
     }
+    transmittance_of_surfaces(scene, ray, target, media)
+}
+
+/// Returns the same as [`transmittance`] for a ray that nothing blocks and that passes surfaces which transmit part of
+/// the light. (Not inlined: its large stack frame would slow down all other rays.)
+#[inline(never)]
+fn transmittance_of_surfaces(
+    scene: &Scene,
+    ray: &SpaceRay,
+    target: &Target,
+    media: &MediumStack,
+) -> (DVec3, u32) {
+    let &Target { distance, surface, glass, bulbs } = target;
     let (mut left, mut rays) = (DVec3::ONE, 1);
     let end = surface.map(|surface| (surface, ray.at(distance)));
     let before_end = |candidate: &Candidate| {
@@ -79,7 +92,9 @@ pub(crate) fn transmittance(
     for _ in 0..MAX_SURFACES {
         rays += 1;
         let next = nearest_layers(scene, &ray, distance - travelled, |candidate| {
-            open(candidate.object) && !bulbs.contains(&candidate.object) && before_end(candidate)
+            scene.is_open(candidate.object, glass == Glass::LetsThrough)
+                && !bulbs.contains(&candidate.object)
+                && before_end(candidate)
         });
         let Some(Layers { top, below }) = next else {
             return (left * media.transmittance(distance - travelled), rays);

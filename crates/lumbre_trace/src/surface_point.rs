@@ -7,7 +7,7 @@ use lumbre_optics::{
     transformed_tangent, try_normalize,
 };
 
-use crate::geometry::{Hit, Place, SpaceRay};
+use crate::geometry::{Hit, Place, RayOrigin, SpaceRay};
 use crate::scene::{Object, Scene, sample_color, sample_lightmap, sample_linear};
 
 /// A hit point on a surface, seen along a ray.
@@ -171,6 +171,11 @@ impl SurfacePoint {
             extent: position.abs().max(ray.origin.abs()).max_element(),
             triangle: None,
         }
+    }
+
+    /// Returns the origin of the rays that leave the point.
+    pub fn ray_origin(&self) -> RayOrigin {
+        RayOrigin::new(self.position, self.geometric, self.extent)
     }
 
     /// Returns the normal for mirroring and refraction: the shading normal, or the geometric one where the

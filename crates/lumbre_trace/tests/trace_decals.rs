@@ -8,7 +8,7 @@ use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{AlphaMode, Light, Material, Surface};
-use lumbre_scene::{Medium, Mesh, Quadric, QuadricShape, Transform};
+use lumbre_scene::{EmissiveLight, Medium, Mesh, Quadric, QuadricShape, Transform};
 use lumbre_trace::{Branch, Kind, Picture, TraceOptions};
 
 use support::*;
@@ -309,22 +309,24 @@ fn emissive_decals_light_others_as_they_look() {
 #[test]
 fn glass_behind_an_opaque_surface_in_its_plane_lights_nothing() {
     // An emissive sheet of glass, and in its plane an opaque one, which is what is visible there.
-    let light = |covered: bool| {
+    let light = |covered: bool, options: &TraceOptions| {
         let mut world = World::new();
         let floor = Quadric::new(QuadricShape::Plane);
         exact(&mut world, floor, painted(Vec3::splat(0.5), false), Transform::IDENTITY);
         let down = Transform::from_xyz(0.1, 0.7, 0.2).with_rotation(DQuat::from_rotation_x(3.1));
         let glowing = Material { transmission: Vec3::splat(0.5), ..painted(Vec3::ONE, true) };
         let thin = Medium { thin: true, ..Medium::default() };
-        world.spawn((Mesh(Arc::new(shapes::plane(1.0, 1.0, 1, 1))), glowing, thin, down));
+        world.spawn((Mesh(Arc::new(shapes::plane(1.0, 1.0, 1, 1))), glowing, thin, down, EmissiveLight));
         if covered {
             world.spawn((Mesh(Arc::new(shapes::plane(2.0, 2.0, 3, 3))), black(), down));
         }
         camera(&mut world, DVec3::new(2.0, 0.3, 0.0), DVec3::new(0.1, 0.0, 0.2), 0.02);
-        draw(&mut world, &paths(8, 64)).0.radiance.iter().sum::<DVec3>()
+        draw(&mut world, options).0.radiance.iter().sum::<DVec3>()
     };
-    assert_eq!(light(true), DVec3::ZERO);
-    assert!(light(false).x > 1.0, "it lights the floor where nothing covers it");
+    for options in [paths(8, 64), options(8)] {
+        assert_eq!(light(true, &options), DVec3::ZERO, "{:?}", options.integrator);
+        assert!(light(false, &options).x > 1.0, "it lights the floor where nothing covers it");
+    }
 }
 
 #[test]

@@ -6,6 +6,7 @@ use lumbre_rays::{Bvh, Ray};
 use lumbre_scene::Quadric;
 
 use super::bounding_ball::BoundingBall;
+use super::occluders::Occluders;
 use super::quadric::{QuadricHit, QuadricSurface};
 use super::ray::SpaceRay;
 
@@ -14,9 +15,8 @@ use super::ray::SpaceRay;
 pub(crate) struct Geometry {
     bvh: Bvh,
     triangles: Vec<Facet>,
-    /// A bit for each triangle that always blocks rays: so few bytes that they stay in a core's first-level cache,
-    /// where facets do not.
-    always_block: Vec<u64>,
+    /// The triangles once more, as shadow rays meet them; `None` if every triangle blocks every ray.
+    occluders: Option<Occluders>,
     quadrics: Vec<PlacedQuadric>,
 }
 
@@ -82,10 +82,6 @@ impl Geometry {
         quadrics: &[(usize, Quadric, DAffine3, DMat3)],
         always_blocks: impl Fn(usize) -> bool,
     ) -> Self {
-        let mut always_block = vec![0; triangles.len().div_ceil(64)];
-        for (index, (_, (object, _))) in triangles.iter().enumerate() {
-            always_block[index / 64] |= u64::from(always_blocks(*object as usize)) << (index % 64);
-        }
         let corners: Vec<[Vec3; 3]> = triangles.iter().map(|(corners, _)| *corners).collect();
         let front = |[a, b, c]: &[Vec3; 3]| {
             let normal = (b.as_dvec3() - a.as_dvec3()).cross(c.as_dvec3() - a.as_dvec3());
@@ -101,7 +97,7 @@ impl Geometry {
         };
         Self {
             bvh: Bvh::build(&corners),
-            always_block,
+            occluders: Occluders::build(&corners, |index| always_blocks(triangles[index].1.0 as usize)),
             triangles: triangles
                 .iter()
                 .map(|(corners, (object, number))| Facet {
@@ -145,6 +141,7 @@ impl Geometry {
 
     /// Returns true if a triangle that always blocks rays, or another surface that `blocks` takes, lies between the
     /// ray's start and the point at a distance, which may be infinite.
+    #[inline]
     pub fn blocked_between(
         &self,
         ray: &SpaceRay,
@@ -152,10 +149,12 @@ impl Geometry {
         blocks: impl Fn(&Candidate) -> bool,
     ) -> bool {
         let short = short_of_end(ray, distance);
-        let blocked = |triangle: u32, u, v| {
-            self.always_blocks(triangle) || blocks(&self.candidate(short.direction, triangle, u, v))
+        let by_triangle = match &self.occluders {
+            None => self.bvh.any_hit(&short),
+            Some(occluders) => occluders
+                .block(&short, |triangle, u, v| blocks(&self.candidate(short.direction, triangle, u, v))),
         };
-        self.bvh.any_hit_filtered(&short, blocked) || self.any_exact_between(ray, distance, &blocks)
+        by_triangle || self.any_exact_between(ray, distance, &blocks)
     }
 
     /// Returns true if any surface lies between the ray's start and the point at a distance, which may be
@@ -191,11 +190,6 @@ impl Geometry {
     }
 
     #[inline]
-    fn always_blocks(&self, triangle: u32) -> bool {
-        self.always_block[triangle as usize / 64] >> (triangle % 64) & 1 == 1
-    }
-
-    #[inline]
     fn candidate(&self, direction: Vec3, triangle: u32, u: f32, v: f32) -> Candidate {
         let facet = &self.triangles[triangle as usize];
         Candidate {
@@ -207,6 +201,7 @@ impl Geometry {
 }
 
 /// Ends the ray short of a surface that its end point lies on.
+#[inline]
 fn short_of_end(ray: &SpaceRay, distance: f64) -> Ray {
     if distance.is_finite() { ray.between_triangles(distance) } else { ray.for_triangles(distance) }
 }

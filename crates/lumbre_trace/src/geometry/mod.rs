@@ -3,8 +3,9 @@
 
 mod bounding_ball;
 mod hierarchy;
+mod occluders;
 mod quadric;
 mod ray;
 
 pub(crate) use hierarchy::{Candidate, Geometry, Hit, Place};
-pub(crate) use ray::SpaceRay;
+pub(crate) use ray::{RayOrigin, SpaceRay};

@@ -1,7 +1,7 @@
 //! Rays in f64, with the offsets that keep them off the surface that they leave and off the one that they end
 //! on. Intersections are in `hierarchy`.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3A};
 use lumbre_rays::{Ray, offset_ray_origin};
 
 /// A ray in the tracer's space.
@@ -12,16 +12,34 @@ pub(crate) struct SpaceRay {
     /// Unit vector.
     pub direction: DVec3,
     /// The surface that it leaves, if it leaves one.
-    pub departure: Option<Departure>,
+    departure: Option<Departure>,
 }
 
 /// The surface that a ray leaves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Departure {
     /// Unit geometric normal, on the side that the ray goes to.
-    pub side: DVec3,
+    side: DVec3,
     /// Largest coordinate of the surface that it leaves, to which rounding errors are relative.
-    pub extent: f64,
+    extent: f64,
+    start: TriangleStart,
+}
+
+/// Where a ray starts for triangles, in f32. (`Vec3A` is copied and read in one piece.)
+#[derive(Clone, Copy, Debug)]
+struct TriangleStart {
+    /// Offset from the surface that the ray leaves.
+    origin: Vec3A,
+    /// From there to the exact origin.
+    back: Vec3A,
+}
+
+/// The origin of all rays that leave a point of a surface. What they have in common is computed once.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RayOrigin {
+    position: DVec3,
+    /// Of the rays to the side of the geometric normal.
+    departure: Departure,
 }
 
 /// Bound of the relative rounding error of a point that was computed in f64 on a surface given by an
@@ -41,7 +59,7 @@ impl SpaceRay {
     /// Creates a ray from a point of a surface with this geometric normal, to either side of it.
     pub fn leaving(origin: DVec3, direction: DVec3, geometric: DVec3, extent: f64) -> Self {
         let side = if direction.dot(geometric) < 0.0 { -geometric } else { geometric };
-        Self { origin, direction, departure: Some(Departure { side, extent }) }
+        Self { origin, direction, departure: Some(Departure::new(origin, side, extent)) }
     }
 
     /// Returns the point at a distance.
@@ -52,8 +70,8 @@ impl SpaceRay {
     /// Returns the ray in f32 for triangles, whose corners are f32, with its origin offset from the surface
     /// that it leaves.
     pub fn for_triangles(&self, farthest: f64) -> Ray {
-        let direction: Vec3 = self.direction.as_vec3();
-        Ray { origin: self.start_off_triangles(), direction, t_min: 0.0, t_max: farthest as f32 }
+        let (origin, direction) = (self.start().origin.into(), self.direction.as_vec3());
+        Ray { origin, direction, t_min: 0.0, t_max: farthest as f32 }
     }
 
     /// Returns an upper bound in metres of the offset of [`for_triangles`](Self::for_triangles).
@@ -67,32 +85,62 @@ impl SpaceRay {
     /// offset origin the point lies in a slightly different direction.
     #[inline]
     pub fn between_triangles(&self, distance: f64) -> Ray {
-        let origin = self.start_off_triangles();
+        let TriangleStart { origin, back } = self.start();
         let distance = distance as f32;
         // Corrects the direction by the offset of the origin. It need not have unit length; after `distance`
         // the ray is at the point to within f32 rounding.
-        let aside = (self.origin - origin.as_dvec3()).as_vec3() / distance;
-        let direction = self.direction.as_vec3() + aside;
+        let direction = self.direction.as_vec3a() + back / distance;
         let size = (origin + direction * distance).abs().max_element().max(distance);
-        Ray { origin, direction, t_min: 0.0, t_max: (distance - ROUNDING as f32 * size).max(0.0) }
+        let t_max = (distance - ROUNDING as f32 * size).max(0.0);
+        Ray { origin: origin.into(), direction: direction.into(), t_min: 0.0, t_max }
     }
 
     #[inline]
-    fn start_off_triangles(&self) -> Vec3 {
-        let origin = self.origin.as_vec3();
-        self.departure.map_or(origin, |Departure { side, extent }| {
-            offset_ray_origin(origin, side.as_vec3(), extent as f32)
-        })
+    fn start(&self) -> TriangleStart {
+        self.departure.map_or_else(
+            || TriangleStart::new(self.origin, self.origin.as_vec3a()),
+            |departure| departure.start,
+        )
     }
 
     /// Returns the origin for surfaces given by equations, offset by its own rounding error.
     pub fn exact_origin(&self) -> DVec3 {
         match self.departure {
             None => self.origin,
-            Some(Departure { side, extent }) => {
+            Some(Departure { side, extent, .. }) => {
                 let size = extent.max(self.origin.abs().max_element());
                 self.origin + side * (EXACT_ERROR * size)
             }
         }
+    }
+}
+
+impl Departure {
+    fn new(origin: DVec3, side: DVec3, extent: f64) -> Self {
+        let offset = offset_ray_origin(origin.as_vec3(), side.as_vec3(), extent as f32);
+        Self { side, extent, start: TriangleStart::new(origin, offset.into()) }
+    }
+}
+
+impl TriangleStart {
+    fn new(exact: DVec3, origin: Vec3A) -> Self {
+        Self { origin, back: (exact - origin.as_dvec3()).as_vec3a() }
+    }
+}
+
+impl RayOrigin {
+    /// Creates the origin at a point of a surface with this geometric normal and largest coordinate.
+    pub fn new(position: DVec3, geometric: DVec3, extent: f64) -> Self {
+        Self { position, departure: Departure::new(position, geometric, extent) }
+    }
+
+    /// Returns the ray in a direction, to either side of the surface.
+    #[inline]
+    pub fn towards(&self, direction: DVec3) -> SpaceRay {
+        let Departure { side, extent, .. } = self.departure;
+        if direction.dot(side) < 0.0 {
+            return SpaceRay::leaving(self.position, direction, side, extent);
+        }
+        SpaceRay { origin: self.position, direction, departure: Some(self.departure) }
     }
 }
