@@ -715,6 +715,7 @@ impl Renderer {
             pipelines_made: self.pipelines.made(),
             pipelines_awaited: 0,
             uploads,
+            lightmaps: self.textures.lightmap_memory(),
         })
     }
 
@@ -799,6 +800,7 @@ impl Renderer {
                 let shares = FrameShares {
                     stages: frame.statistics.cpu,
                     uploads: frame.statistics.uploads,
+                    lightmaps: frame.statistics.lightmaps,
                     effects,
                     pipelines_made: frame.statistics.pipelines_made.saturating_sub(self.pipelines_before),
                 };

@@ -91,7 +91,7 @@ pub const STUDIES: &[StudyKind] = &[
         method: 3,
         run: reflection::run,
     },
-    StudyKind { name: "lightmaps", about: "density and format of lightmaps", method: 2, run: lightmaps::run },
+    StudyKind { name: "lightmaps", about: "density and format of lightmaps", method: 3, run: lightmaps::run },
     StudyKind {
         name: "precision",
         about: "f32 on the device, compared with f64",

@@ -131,7 +131,7 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     let mut chosen = search.choose(goal, [NARROWED_DOWN, CHOSEN])?;
     let mut front = search.found.front();
     let mut of_lightmaps = Vec::new();
-    let sizes = |way: &DrawSettings| lightmaps.bytes(way.lightmap_reduction);
+    let sizes = |way: &DrawSettings| lightmaps.bytes(way);
     // Without a goal, the errors of coarser lightmaps show best beside the most accurate settings.
     if let Some(of) = chosen.or(front.last().copied()).filter(|_| !lightmaps.is_empty()) {
         let variants = lightmap_density::variants(search.found.settings[of]);
@@ -144,7 +144,8 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
             places.iter().map(|&place| (&found.points[place], sizes(&found.settings[place]))).collect();
         chosen =
             chosen.map(|chosen| lightmap_density::choose(&points, goal).map_or(chosen, |one| places[one]));
-        of_lightmaps = lightmap_density::findings(&points);
+        let ways: Vec<DrawSettings> = places.iter().map(|&place| found.settings[place]).collect();
+        of_lightmaps = lightmap_density::findings(&points, &ways);
         front = lightmap_density::front(found, chosen, sizes);
     }
     let Search { found, cameras, ways, .. } = search;
@@ -287,7 +288,7 @@ fn study(scene: &str) -> Study {
         name: "tune".into(),
         title: format!("Settings for {scene}"),
         question: "Which settings draw the level with the least error within a time, or in the least time within an error?".into(),
-        reference: "the most accurate settings: Phong shading with soft shadows of twice the default resolution, lamps that do not end, four samples per pixel, and the file's lightmaps; times are those of the slowest camera, and errors those of the camera with the largest error".into(),
+        reference: "the most accurate settings: Phong shading with soft shadows of twice the default resolution, lamps that do not end, four samples per pixel, and the file's lightmaps as half floats; times are those of the slowest camera, and errors those of the camera with the largest error".into(),
         plots: vec![Plot {
             title: "Error over time".into(),
             across: Quantity::Milliseconds,
