@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use lumbre_bake::{
     Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, has_light_to_bake,
 };
+use lumbre_optics::Material;
 use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, Mesh, StaticObject, hidden_entities};
 
 use crate::converged::Maps;
@@ -133,6 +134,37 @@ pub fn bake_world(
     let bake = Bake::new(options).former(former).keep_samples(&mut samples);
     let report = bake.progress(telling(conditions, told)).run(&mut world)?;
     Ok((Baked { world, report }, samples))
+}
+
+/// Bakes a scene whose surfaces reflect nothing while it is baked. A lightmap holds the light that arrives, so that
+/// each surface still gets its direct light.
+///
+/// # Errors
+/// [`CostError::Bake`], [`CostError::Load`], [`CostError::Interrupted`].
+pub fn bake_direct_light(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    options: &BakeOptions,
+    told: [f64; 2],
+) -> Result<Baked, CostError> {
+    let mut world = scene.open(conditions.aspect())?;
+    let mut materials = world.query::<(Entity, &mut Material)>();
+    let mut own: Vec<(Entity, Material)> = Vec::new();
+    for (entity, mut material) in materials.iter_mut(&mut world) {
+        own.push((entity, material.clone()));
+        let material = &mut *material;
+        for surface in std::iter::once(&mut material.front).chain(&mut material.back) {
+            (surface.ambient, surface.diffuse, surface.specular) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        }
+        material.mirror = Vec3::ZERO;
+    }
+    let (mut baked, _) = bake_world(conditions, world, options, None, told)?;
+    for (entity, material) in own {
+        if let Ok(mut entity) = baked.world.get_entity_mut(entity) {
+            entity.insert(material);
+        }
+    }
+    Ok(baked)
 }
 
 /// Returns a callback that reports the progress of a bake; `told` are the fractions of the study that are

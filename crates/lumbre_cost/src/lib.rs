@@ -29,6 +29,7 @@
 
 mod all_pairs;
 mod baked;
+mod bounce_by_bounce;
 mod clustered_mesh;
 mod command_line;
 mod comparison;

@@ -3,15 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use bevy_ecs::prelude::*;
-use glam::Vec3;
 use lumbre_bake::{BakeOptions, Quality};
-use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
 
 use super::over_scenes;
 use crate::baked::{
-    Baked, bake_arguments, bake_options, bake_scene, bake_world, maps_of, nothing_to_bake, picture_of_maps,
+    bake_arguments, bake_direct_light, bake_options, bake_scene, maps_of, nothing_to_bake, picture_of_maps,
     texel_error,
 };
 use crate::converged_bake::{converged, converged_bake};
@@ -170,7 +167,7 @@ fn of_scene(
         let asked = &all[place];
         let baked = match asked.bounces {
             true => bake_scene(conditions, scene, &asked.options, told)?,
-            false => bake_without_bounces(conditions, scene, &asked.options, told)?,
+            false => bake_direct_light(conditions, scene, &asked.options, told)?,
         };
         Ok((1e3 * baked.report.seconds, baked))
     })?;
@@ -210,34 +207,6 @@ fn of_scene(
     let findings = findings(scene, &points);
     measured.study.findings.extend(findings);
     Ok(())
-}
-
-/// Bakes a scene whose surfaces reflect nothing while it is baked. A lightmap holds the light that arrives, so that
-/// each surface still gets its direct light.
-fn bake_without_bounces(
-    conditions: &Conditions<'_>,
-    scene: &SceneFile,
-    options: &BakeOptions,
-    told: [f64; 2],
-) -> Result<Baked, CostError> {
-    let mut world = scene.open(conditions.aspect())?;
-    let mut materials = world.query::<(Entity, &mut Material)>();
-    let mut own: Vec<(Entity, Material)> = Vec::new();
-    for (entity, mut material) in materials.iter_mut(&mut world) {
-        own.push((entity, material.clone()));
-        let material = &mut *material;
-        for surface in std::iter::once(&mut material.front).chain(&mut material.back) {
-            (surface.ambient, surface.diffuse, surface.specular) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-        }
-        material.mirror = Vec3::ZERO;
-    }
-    let (mut baked, _) = bake_world(conditions, world, options, None, told)?;
-    for (entity, material) in own {
-        if let Ok(mut entity) = baked.world.get_entity_mut(entity) {
-            entity.insert(material);
-        }
-    }
-    Ok(baked)
 }
 
 fn parameters(asked: &Asked) -> BTreeMap<String, f64> {
