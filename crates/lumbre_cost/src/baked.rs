@@ -82,6 +82,32 @@ pub fn nothing_to_bake_in(world: &mut World, name: &str) -> Option<String> {
     }
 }
 
+/// Static triangles from which on a quick report bakes less often. Each of them is a patch at least, and has a texel
+/// at least, so that a bake of many takes seconds, however few texels are asked for.
+const MANY_TRIANGLES: usize = 5_000;
+
+/// Returns whether a quick report makes fewer bakes of a scene, because each of them takes seconds, and a sentence for
+/// the page that says so.
+///
+/// # Errors
+/// [`CostError::Load`].
+pub fn few_bakes(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Option<String>, CostError> {
+    if !conditions.quick || conditions.files.is_empty() {
+        return Ok(None);
+    }
+    let mut world = scene.open(conditions.aspect())?;
+    let hidden = hidden_entities(&mut world);
+    let mut objects = world.query_filtered::<(Entity, &Mesh), With<StaticObject>>();
+    let shown = objects.iter(&world).filter(|(entity, _)| !hidden.contains(entity));
+    let triangles = shown.map(|(_, mesh)| mesh.0.triangle_count()).sum::<usize>();
+    Ok((triangles > MANY_TRIANGLES).then(|| {
+        format!(
+            "{} has {triangles} static triangles, so that each bake takes seconds. This quick report makes fewer of them than a full one.",
+            scene.name
+        )
+    }))
+}
+
 /// Returns the area of everything that is baked, in square metres.
 fn static_area(world: &mut World) -> f64 {
     let hidden = hidden_entities(world);

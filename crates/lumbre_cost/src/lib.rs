@@ -56,6 +56,7 @@ mod rounds;
 mod run;
 mod scene_file;
 mod scenes;
+mod shared_bake;
 mod spread;
 mod studies;
 mod table;

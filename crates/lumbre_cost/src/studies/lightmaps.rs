@@ -7,12 +7,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bevy_ecs::prelude::*;
 use lumbre_bake::{BakeOptions, BakeReport, Density};
 use lumbre_render::{FrameOptions, LightmapMemory};
-use lumbre_scene::{FrameSettings, Lightmap, LightmapEncoding, SceneSettings};
+use lumbre_scene::{FrameSettings, Lightmap, LightmapEncoding, SceneSettings, reduce_lightmaps};
 use lumbre_trace::relative_error;
 
-use super::bake::{ERROR, QUICK_ERROR, REFERENCE_SECONDS};
+use super::bake::{ERROR, QUICK_ERROR, reference_seconds};
 use super::over_scenes;
-use crate::baked::{bake_arguments, bake_options, bake_scene, nothing_to_bake};
+use crate::baked::{bake_arguments, bake_options, few_bakes, nothing_to_bake};
 use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{counted, factor, listed, percent, ratio_of, rounded, short, times_of};
 use crate::frame::Frame;
@@ -22,12 +22,15 @@ use crate::measured::Measured;
 use crate::picture::Picture;
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;
+use crate::shared_bake::bake_once;
 use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Study};
 
 /// Approximate number of texels of the reference; each lower density has a quarter of the texels of the one
 /// before.
 const TEXELS: f64 = 20_000.0;
 const FEW_TEXELS: f64 = 4_000.0;
+/// The same where each bake takes seconds, as in other studies, so that they share the bake.
+const FEWEST_TEXELS: f64 = 700.0;
 /// Reductions of the density relative to the densest.
 const PARTS: &[f64] = &[1.0, 2.0, 4.0, 8.0];
 const FEW_PARTS: &[f64] = &[1.0, 2.0, 4.0];
@@ -78,6 +81,8 @@ struct Maps {
     report: BakeReport,
     options: BakeOptions,
     density: f64,
+    /// How many texels of the bake became one along each side.
+    reduction: u32,
 }
 
 fn of_scene(
@@ -91,19 +96,32 @@ fn of_scene(
         return Ok(());
     }
     let part = |share: f64| before + share * (after - before);
-    let options = bake_options(conditions, scene, conditions.unless_quick(TEXELS, FEW_TEXELS))?;
+    let few = few_bakes(conditions, scene)?;
+    let has_few = few.is_some();
+    measured.study.notes.extend(few.map(|why| {
+        format!("{why} It bakes the highest density only, with fewer texels; lower densities are means of its texels.")
+    }));
+    let texels = if has_few { FEWEST_TEXELS } else { conditions.unless_quick(TEXELS, FEW_TEXELS) };
+    let options = bake_options(conditions, scene, texels)?;
     let Density::TexelsPerMeter(densest) = options.density else { return Ok(()) };
     let error = conditions.unless_quick(ERROR, QUICK_ERROR);
     let parts = conditions.unless_quick(PARTS, FEW_PARTS);
+    let options_of_densest = options;
     let mut all = Vec::new();
     for (place, halved) in parts.iter().enumerate() {
         let density = densest / halved;
         let options = BakeOptions { density: Density::TexelsPerMeter(density), error, ..options };
         let told = [place, place + 1].map(|place| part(0.3 * place as f64 / parts.len() as f64));
-        let baked = bake_scene(conditions, scene, &options, told)?;
-        all.push(Maps { world: Arc::new(Mutex::new(baked.world)), report: baked.report, options, density });
+        let mut baked = match has_few {
+            true => bake_once(conditions, scene, &BakeOptions { error, ..options_of_densest }, told)?,
+            false => bake_once(conditions, scene, &options, told)?,
+        };
+        let reduction = if has_few { *halved as u32 } else { 1 };
+        reduce_lightmaps(&mut baked.world, reduction);
+        let (world, report) = (Arc::new(Mutex::new(baked.world)), baked.report);
+        all.push(Maps { world, report, options, density, reduction });
     }
-    let time = conditions.reference_time(8.0, REFERENCE_SECONDS);
+    let time = conditions.reference_time(8.0, reference_seconds(has_few));
     let options_of_truth = converged(conditions, &BakeOptions { error, ..options }, time);
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.3), part(0.6)])?;
     let noise = truth.report.error_of_mean;
@@ -168,6 +186,12 @@ fn point(
     memory: LightmapMemory,
 ) -> Point {
     let counts = [(BYTES, memory.bytes as f64), ("texels", memory.texels as f64)];
+    let density = Density::TexelsPerMeter(maps.density * f64::from(maps.reduction));
+    let baked_with = BakeOptions { density, ..maps.options };
+    let reduced = match maps.reduction {
+        1 => String::new(),
+        reduction => format!(" --lightmap-reduction {reduction}"),
+    };
     Point {
         series: scene.series(conditions, format.name()),
         label: format!("{} a metre", short(maps.density)),
@@ -177,8 +201,8 @@ fn point(
         command: format!(
             "lumbre bake {} -o baked.glb {} && {}",
             scene.in_commands(),
-            bake_arguments(&maps.options),
-            conditions.drawing("baked.glb", &format!(" --lightmap-format {}", format.name()))
+            bake_arguments(&baked_with),
+            conditions.drawing("baked.glb", &format!(" --lightmap-format {}{reduced}", format.name()))
         ),
         ..Point::default()
     }
@@ -239,14 +263,14 @@ fn finding_of_times(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Opti
     let others = LightmapEncoding::ALL.iter().map(|format| format.name()).filter(|name| *name != halves);
     let ratio = |name: &str| ratio_of(&of_format(name), &of_format(halves));
     let ratios: Vec<String> =
-        others.filter_map(|name| Some(format!("{} with {name}", factor(&ratio(name)?)))).collect();
+        others.filter_map(|name| Some(format!("with {name} {}", factor(&ratio(name)?)))).collect();
     let ratios: Vec<&str> = ratios.iter().map(String::as_str).collect();
     let texels = |point: &Point| point.counts.get("texels").copied().unwrap_or_default();
     let of_halves = || points.iter().filter(|point| point.series.starts_with(halves));
     let most = of_halves().max_by(|a, b| texels(a).total_cmp(&texels(b)))?;
     let fewest = of_halves().min_by(|a, b| texels(a).total_cmp(&texels(b)))?;
     Some(format!(
-        "Compared with {halves}, frames of the {scene} take {} times as long; with {} texels instead of {}, {}.",
+        "A frame of the {scene} takes this many times as long as with {halves}: {}. With {} texels instead of {} it takes {}.",
         listed(&ratios, "and"),
         counted(texels(fewest)),
         counted(texels(most)),

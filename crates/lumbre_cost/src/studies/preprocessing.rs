@@ -4,7 +4,7 @@
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_bake::BakeOptions;
+use lumbre_bake::{BakeOptions, Samples};
 use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
 use lumbre_scene::{
@@ -12,10 +12,10 @@ use lumbre_scene::{
     hidden_entities,
 };
 
-use super::bake::{ERROR, QUICK_ERROR, REFERENCE_SECONDS};
+use super::bake::{ERROR, QUICK_ERROR, reference_seconds};
 use super::over_scenes;
 use crate::baked::{
-    Baked, bake_arguments, bake_direct_light, bake_options, bake_world, maps_of, nothing_to_bake,
+    Baked, bake_arguments, bake_direct_light, bake_options, bake_world, few_bakes, maps_of, nothing_to_bake,
     picture_of_maps, texel_error,
 };
 use crate::bounce_by_bounce::{BounceByBounce, not_followed};
@@ -96,12 +96,23 @@ fn of_scene(
         return Ok(());
     }
     let part = |share: f64| before + share * (after - before);
+    let few = few_bakes(conditions, scene)?;
+    let has_few = few.is_some();
+    measured.study.notes.extend(few.map(|why| {
+        format!(
+            "{why} After a change it bakes once, for an error of {} instead of {}.",
+            percent(QUICK_ERROR),
+            percent(ERROR)
+        )
+    }));
     let options = options_of(conditions, scene, 1.0)?;
     let options = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..options };
     // The converged bake does not depend on the requested error.
-    let options_of_truth = converged(conditions, &options, conditions.reference_time(8.0, REFERENCE_SECONDS));
-    let (baked, _) =
+    let time = conditions.reference_time(8.0, reference_seconds(has_few));
+    let options_of_truth = converged(conditions, &options, time);
+    let (mut baked, samples) =
         bake_world(conditions, scene.open(conditions.aspect())?, &options, None, [part(0.0), part(0.1)])?;
+    conditions.bakes.keep(scene, &options, &mut baked);
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.1), part(0.3)])?;
     let truth = truth.picture.clone();
     let first = measured.study.points.len();
@@ -118,11 +129,14 @@ fn of_scene(
             // In a single room hardly any light stays the same, whatever moves.
             let rooms = SceneFile::made(conditions, "two-rooms", two_rooms())?;
             let options = options_of(conditions, &rooms, 2.0)?;
-            after_a_change(conditions, &rooms, &options, [part(0.5), part(1.0)], measured)
+            after_a_change(conditions, &rooms, &options, None, [part(0.5), part(1.0)], measured)
+        }
+        false if has_few => {
+            after_a_change(conditions, scene, &options, Some(samples), [part(0.5), part(1.0)], measured)
         }
         false => {
             let options = options_of(conditions, scene, 1.0)?;
-            after_a_change(conditions, scene, &options, [part(0.5), part(1.0)], measured)
+            after_a_change(conditions, scene, &options, None, [part(0.5), part(1.0)], measured)
         }
     }
 }
@@ -134,11 +148,13 @@ fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Res
     Ok(BakeOptions { error: ERROR, ..bake_options(conditions, scene, texels)? })
 }
 
-/// Moves an object of a scene, and bakes the scene from scratch and by reusing a former bake.
+/// Moves an object of a scene, and bakes the scene from scratch and by reusing a former bake. Where each bake takes
+/// seconds, `known` are the samples of a former bake with these options, if it left any, and each bake is made once.
 fn after_a_change(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
     options: &BakeOptions,
+    known: Option<Option<Samples>>,
     [before, after]: [f64; 2],
     measured: &mut Measured,
 ) -> Result<(), CostError> {
@@ -149,7 +165,11 @@ fn after_a_change(
         measured.study.notes.push(note);
         return Ok(());
     };
-    let (_, samples) = bake_world(conditions, open()?, options, None, [part(0.0), part(0.1)])?;
+    let has_few = known.is_some();
+    let samples = match known {
+        Some(samples) => samples,
+        None => bake_world(conditions, open()?, options, None, [part(0.0), part(0.1)])?.1,
+    };
     let Some(samples) = samples else {
         measured
             .study
@@ -163,7 +183,7 @@ fn after_a_change(
         Ok(world)
     };
     let first = measured.study.points.len();
-    let time = conditions.reference_time(8.0, REFERENCE_SECONDS);
+    let time = conditions.reference_time(8.0, reference_seconds(has_few));
     let options_of_truth = converged(conditions, options, time);
     let (mut truth, _) = bake_world(conditions, changed()?, &options_of_truth, None, [part(0.1), part(0.4)])?;
     let drawn = draw_picture(conditions, &mut truth.world, &FrameOptions::default())?;
@@ -172,7 +192,8 @@ fn after_a_change(
     let reference_maps =
         measured.keep_reference(&format!("{} changed, converged maps", scene.name), picture_of_maps(&truth));
     let formers = [None, Some(&samples)];
-    let done = repeated(formers.len(), conditions.repetitions(), |place, [from, to]| {
+    let repetitions = if has_few { 1 } else { conditions.repetitions() };
+    let done = repeated(formers.len(), repetitions, |place, [from, to]| {
         let told = [from, to].map(|share| part(0.4 + 0.6 * share));
         let (baked, _) = bake_world(conditions, changed()?, options, formers[place], told)?;
         Ok((1e3 * baked.report.seconds, baked))

@@ -33,6 +33,7 @@ use crate::machine::machine;
 use crate::measured::Measured;
 use crate::rounds::Rounds;
 use crate::scene_file::SceneFile;
+use crate::shared_bake::SharedBakes;
 use crate::{Conditions, CostError, CostReport, Listener, Plot, Point, Quantity, Settings, Spread, Study};
 
 /// The result of tuning.
@@ -82,12 +83,14 @@ pub fn tune(
     let begun = Instant::now();
     let files = [options.file.clone()];
     let (pictures, converged) = (RefCell::new(Renderer::new(gpu)), ConvergedBakes::default());
+    let bakes = SharedBakes::default();
     let ahead = device_ahead(gpu);
     let conditions = Conditions {
         gpu,
         ahead: ahead.as_ref(),
         pictures: &pictures,
         converged: &converged,
+        bakes: &bakes,
         quick: options.quick,
         counts_only: false,
         counts_lights: false,
