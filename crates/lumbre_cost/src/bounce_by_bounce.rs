@@ -22,7 +22,7 @@ use crate::rounds::milliseconds_since;
 /// The lightmaps of a level as a graph along which light bounces.
 pub struct BounceByBounce {
     images: Vec<Arc<LightmapImage>>,
-    /// The texels whose centre shows a surface, image by image.
+    /// The texels that show a surface.
     texels: Vec<Place>,
     /// Light that has arrived after the bounces so far, and by the last of them: E/π of each texel.
     arrived: Vec<Vec3>,
@@ -46,6 +46,13 @@ struct Place {
 struct Reflected {
     texel: u32,
     reflectance: Vec3,
+}
+
+/// A point of a triangle that a texel shows, by the weights of the triangle's corners.
+#[derive(Clone, Copy)]
+struct Shown {
+    surface: usize,
+    weights: [f32; 3],
 }
 
 /// A triangle in the world, with the lightmap that it shows.
@@ -80,27 +87,31 @@ impl BounceByBounce {
         let bvh = Bvh::build(&corners);
         let mut numbers: Vec<Vec<u32>> =
             images.iter().map(|image| vec![NOTHING; image.texels.len()]).collect();
-        let (mut texels, mut points) = (Vec::new(), Vec::new());
+        let (mut texels, mut points): (Vec<Place>, Vec<Vec<Shown>>) = (Vec::new(), Vec::new());
         for (number, surface) in surfaces.iter().enumerate() {
             for (texel, weights) in covered(surface, &images[surface.image]) {
-                if numbers[surface.image][texel] == NOTHING {
-                    numbers[surface.image][texel] = texels.len() as u32;
+                let known = &mut numbers[surface.image][texel];
+                if *known == NOTHING {
+                    *known = texels.len() as u32;
                     texels.push(Place { image: surface.image, texel });
-                    points.push((number, weights));
+                    points.push(Vec::new());
                 }
+                points[*known as usize].push(Shown { surface: number, weights });
             }
         }
         let hits = points
             .par_iter()
             .enumerate()
-            .flat_map_iter(|(texel, &(number, weights))| {
-                let surface = &surfaces[number];
-                let from = surface.point(weights);
+            .flat_map_iter(|(texel, points)| {
                 let (surfaces, images, numbers, bvh) = (&surfaces, &images, &numbers, &bvh);
                 (0..rays).map(move |ray| {
-                    let direction = cosine_direction(from.1, ray, rays, texel);
+                    let Shown { surface, weights } = points[ray % points.len()];
+                    let surface = &surfaces[surface];
+                    let (position, normal) = surface.point(weights);
+                    let direction = cosine_direction(normal, ray, rays, texel);
                     let is_outside = direction.dot(surface.facing) > 0.0;
-                    let origin = offset_ray_origin(from.0, surface.facing, triangle_extent(&surface.corners));
+                    let origin =
+                        offset_ray_origin(position, surface.facing, triangle_extent(&surface.corners));
                     let hit = bvh.closest_hit(&Ray::new(origin, direction)).filter(|_| is_outside);
                     hit.map_or_else(Reflected::default, |hit| {
                         let reached = &surfaces[hit.triangle as usize];
@@ -171,7 +182,7 @@ impl BounceByBounce {
     }
 }
 
-/// The number of a texel whose centre shows no surface.
+/// The number of a texel that shows no surface.
 const NOTHING: u32 = u32::MAX;
 
 /// Returns the lightmaps of a World, and the triangles that show them.
@@ -236,9 +247,13 @@ fn surfaces_of(
     })
 }
 
-/// Returns the texels whose centres a triangle covers, with the weights of its corners there.
+/// Points at which a texel is looked at, along each side. None lies on its centre: those of a chart's border may lie on
+/// the edge of a wall, from which rays would pass the wall beside it.
+const POINTS: u32 = 4;
+
+/// Returns the texels of which a triangle covers points, with the weights of its corners at each of these.
 fn covered(surface: &Surface, image: &LightmapImage) -> Vec<(usize, [f32; 3])> {
-    let size = Vec2::new(image.width as f32, image.height as f32);
+    let size = Vec2::new((POINTS * image.width) as f32, (POINTS * image.height) as f32);
     let [a, b, c] = surface.coordinates.map(|at| at * size);
     let area = (b - a).perp_dot(c - a);
     if area == 0.0 || !area.is_finite() {
@@ -246,13 +261,13 @@ fn covered(surface: &Surface, image: &LightmapImage) -> Vec<(usize, [f32; 3])> {
     }
     let low = a.min(b).min(c).floor().max(Vec2::ZERO).as_uvec2();
     let high = a.max(b).max(c).ceil().min(size).as_uvec2();
-    let centres = (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| (x, y)));
-    let inside = centres.filter_map(|(x, y)| {
+    let points = (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| (x, y)));
+    let inside = points.filter_map(|(x, y)| {
         let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
         let second = (at - a).perp_dot(c - a) / area;
         let third = (b - a).perp_dot(at - a) / area;
         let weights = [1.0 - second - third, second, third];
-        let texel = y as usize * image.width as usize + x as usize;
+        let texel = (y / POINTS) as usize * image.width as usize + (x / POINTS) as usize;
         weights.iter().all(|weight| *weight >= 0.0).then_some((texel, weights))
     });
     inside.collect()
@@ -265,8 +280,8 @@ impl Surface {
         (mixed(&self.corners), mixed(&self.normals).try_normalize().unwrap_or(self.facing))
     }
 
-    /// Returns what a ray that arrives from this direction finds at a point. The light at a point whose texel's centre
-    /// shows no surface is that of the nearest texel that has one, at most two texels away.
+    /// Returns what a ray that arrives from this direction finds at a point. The light at a point whose texel
+    /// shows no surface at any of the points is that of the nearest texel that does, at most two texels away.
     fn reflected(
         &self,
         weights: [f32; 3],
@@ -345,15 +360,18 @@ mod tests {
 
     use super::*;
 
-    /// The inside of a cube with sides of 2, whose surface has this diffuse reflectance and this direct light.
-    fn furnace(reflectance: f32, direct: f32) -> World {
-        const SIDE: u32 = 24;
+    const SIDE: u32 = 24;
+
+    /// The inside of a cube with sides of 2, whose surface has this diffuse reflectance and this direct light. The
+    /// edges of the cube are this many texels inside the borders of its charts.
+    fn furnace(reflectance: f32, direct: f32, inside: f32) -> World {
         let mut world = World::new();
         let mut cube = shapes::cuboid(Vec3::splat(2.0), 1);
         // Each side has a third of the map's width and half of its height. Its vertices follow one another.
         cube.uv1 = (0..cube.positions.len())
             .map(|at| {
-                let (side, corner) = (at / 4, cube.uv0[at]);
+                let side = at / 4;
+                let corner = (inside + cube.uv0[at] * (SIDE as f32 - 2.0 * inside)) / SIDE as f32;
                 (Vec2::new((side % 3) as f32, (side / 3) as f32) + corner) / Vec2::new(3.0, 2.0)
             })
             .collect();
@@ -377,24 +395,25 @@ mod tests {
     #[test]
     fn in_a_furnace_each_bounce_brings_the_reflectance_times_the_one_before() {
         let (reflectance, direct) = (0.6, 0.5);
-        let mut bounces = BounceByBounce::new(&mut furnace(reflectance, direct), 64);
-        assert_eq!(bounces.texels(), 6 * 24 * 24);
-        let (mut sum, mut last) = (direct, direct);
-        for bounce in 1..=6 {
-            bounces.bounce();
-            last *= reflectance;
-            sum += last;
-            for light in &bounces.arrived {
-                // The furnace is closed, so that every ray hits: only f32 rounds.
-                assert!(
-                    (*light - Vec3::splat(sum)).abs().max_element() < 1e-5,
-                    "{bounce}: {light}, not {sum}"
-                );
+        // With half a texel, the centres of the outermost texels lie on the edges of the cube.
+        for inside in [0.0, 0.5] {
+            let mut bounces = BounceByBounce::new(&mut furnace(reflectance, direct, inside), 64);
+            assert_eq!(bounces.texels(), 6 * (SIDE * SIDE) as usize);
+            let (mut sum, mut last) = (direct, direct);
+            for bounce in 1..=6 {
+                bounces.bounce();
+                last *= reflectance;
+                sum += last;
+                for light in &bounces.arrived {
+                    // The furnace is closed, so that every ray hits: only f32 rounds.
+                    let apart = (*light - Vec3::splat(sum)).abs().max_element();
+                    assert!(apart < 1e-5, "{inside} {bounce}: {light}, not {sum}");
+                }
+                assert!((bounces.share_of_last() - f64::from(last / sum)).abs() < 1e-5);
             }
-            assert!((bounces.share_of_last() - f64::from(last / sum)).abs() < 1e-5);
         }
         // Negative control: without a reflectance nothing is added.
-        let mut black = BounceByBounce::new(&mut furnace(0.0, direct), 8);
+        let mut black = BounceByBounce::new(&mut furnace(0.0, direct, 0.0), 8);
         black.bounce();
         assert!(black.arrived.iter().all(|light| *light == Vec3::splat(direct)));
     }

@@ -252,7 +252,7 @@ fn by_bounces(
     }
     let mut light = BounceByBounce::new(&mut direct, conditions.unless_quick(RAYS, FEW_RAYS));
     measured.study.notes.push(format!(
-        "Single bounces: the baker leaves out all of them, and then {} rays from each of the {} texels whose centre shows a surface gather one bounce after the other; textures reflect by their mean. With lightmaps without a number of bounces, the baker has solved for all of them.",
+        "Single bounces: the baker leaves out all of them, and then {} rays from each of the {} texels that show a surface gather one bounce after the other; textures reflect by their mean. With lightmaps without a number of bounces, the baker has solved for all of them.",
         conditions.unless_quick(RAYS, FEW_RAYS),
         light.texels()
     ));
