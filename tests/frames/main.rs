@@ -24,6 +24,7 @@ mod irradiance_volumes;
 mod level;
 mod light_counts;
 mod light_lists;
+mod lightmap_formats;
 mod materials;
 mod mirrors;
 mod missing_pipelines;

@@ -9,7 +9,7 @@ use lumbre::cost::STUDIES;
 use lumbre::demo::key_help;
 use lumbre::optics::{FlatRule, NoShading, ReflectionModel, Shading};
 use lumbre::render::{Display, RenderingPath};
-use lumbre::scene::{FrameSettings, PackedFormat, ShadowFilter};
+use lumbre::scene::{FrameSettings, LightmapEncoding, PackedFormat, ShadowFilter};
 use lumbre::trace::{Aov, DEFAULT_WEIGHT, Filter, Integrator, TreeFormat};
 
 /// Lighting for games that tells you what it costs.
@@ -580,6 +580,9 @@ pub struct Frame {
     /// Show lightmaps with N times fewer texels along each side: each is the mean of those it replaces.
     #[arg(long, value_name = "N", default_value = "1", hide_default_value = true, value_parser = clap::value_parser!(u32).range(1..=64), allow_negative_numbers = true)]
     pub lightmap_reduction: u32,
+    /// Format of lightmaps on the device, instead of the file's: f32, f16 or RGB9E5 (16, 8 or 4 bytes a texel).
+    #[arg(long, value_name = "rgb32f|rgb16f|rgb9e5", value_parser = lightmap_format)]
+    pub lightmap_format: Option<LightmapEncoding>,
     /// Ignore irradiance volumes; moving objects then get the scene's ambient light.
     #[arg(long)]
     pub no_irradiance_volumes: bool,
@@ -670,6 +673,10 @@ fn shadow_resolution(text: &str) -> Result<f32, String> {
 fn shadow_filter(text: &str) -> Result<ShadowFilter, String> {
     let names: Vec<&str> = ShadowFilter::ALL.iter().map(|filter| filter.name()).collect();
     ShadowFilter::from_name(text).ok_or_else(|| format!("use one of {}", names.join(", ")))
+}
+
+fn lightmap_format(text: &str) -> Result<LightmapEncoding, String> {
+    named(LightmapEncoding::from_name(text), LightmapEncoding::ALL.iter().map(|format| format.name()))
 }
 
 /// Parses a number, or a percentage.

@@ -124,6 +124,7 @@ pub fn frame_options(
     settings.shadows |= frame.shadows || frame.every_shadow;
     settings.shadow_resolution = frame.shadow_resolution.unwrap_or(settings.shadow_resolution);
     settings.shadow_filter = frame.shadow_filter.unwrap_or(settings.shadow_filter);
+    settings.lightmap_format = frame.lightmap_format.unwrap_or(settings.lightmap_format);
     reduce_lightmaps(world, frame.lightmap_reduction);
     if frame.every_shadow {
         let mut lights = world.query::<&mut Light>();

@@ -152,6 +152,10 @@ fn meaningless(asked: &Trace) -> Vec<&'static str> {
             !trees && asked.frame.lightmap_reduction > 1,
             "--lightmap-reduction means nothing to --integrator path: paths find bounced light themselves",
         ),
+        (
+            asked.frame.lightmap_format.is_some(),
+            "--lightmap-format is for frames: the ray tree reads lightmaps in f32, and paths read none",
+        ),
         (asked.frame.no_msaa, "--no-msaa changes nothing: --samples says how many samples a pixel has"),
         (!asked.frame.without.is_empty(), "--without is for frames: rays have every effect of the scene"),
         (!trees && asked.frame.msaa, "--msaa is for the ray tree: paths take --samples"),

@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use lumbre_bake::{
     Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, has_light_to_bake,
 };
+use lumbre_optics::Material;
 use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, Mesh, StaticObject, hidden_entities};
 
 use crate::converged::Maps;
@@ -81,6 +82,32 @@ pub fn nothing_to_bake_in(world: &mut World, name: &str) -> Option<String> {
     }
 }
 
+/// Static triangles from which on a quick report bakes less often. Each of them is a patch at least, and has a texel
+/// at least, so that a bake of many takes seconds, however few texels are asked for.
+const MANY_TRIANGLES: usize = 5_000;
+
+/// Returns whether a quick report makes fewer bakes of a scene, because each of them takes seconds, and a sentence for
+/// the page that says so.
+///
+/// # Errors
+/// [`CostError::Load`].
+pub fn few_bakes(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Option<String>, CostError> {
+    if !conditions.quick || conditions.files.is_empty() {
+        return Ok(None);
+    }
+    let mut world = scene.open(conditions.aspect())?;
+    let hidden = hidden_entities(&mut world);
+    let mut objects = world.query_filtered::<(Entity, &Mesh), With<StaticObject>>();
+    let shown = objects.iter(&world).filter(|(entity, _)| !hidden.contains(entity));
+    let triangles = shown.map(|(_, mesh)| mesh.0.triangle_count()).sum::<usize>();
+    Ok((triangles > MANY_TRIANGLES).then(|| {
+        format!(
+            "{} has {triangles} static triangles, so that each bake takes seconds. This quick report makes fewer of them than a full one.",
+            scene.name
+        )
+    }))
+}
+
 /// Returns the area of everything that is baked, in square metres.
 fn static_area(world: &mut World) -> f64 {
     let hidden = hidden_entities(world);
@@ -133,6 +160,37 @@ pub fn bake_world(
     let bake = Bake::new(options).former(former).keep_samples(&mut samples);
     let report = bake.progress(telling(conditions, told)).run(&mut world)?;
     Ok((Baked { world, report }, samples))
+}
+
+/// Bakes a scene whose surfaces reflect nothing while it is baked. A lightmap holds the light that arrives, so that
+/// each surface still gets its direct light.
+///
+/// # Errors
+/// [`CostError::Bake`], [`CostError::Load`], [`CostError::Interrupted`].
+pub fn bake_direct_light(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    options: &BakeOptions,
+    told: [f64; 2],
+) -> Result<Baked, CostError> {
+    let mut world = scene.open(conditions.aspect())?;
+    let mut materials = world.query::<(Entity, &mut Material)>();
+    let mut own: Vec<(Entity, Material)> = Vec::new();
+    for (entity, mut material) in materials.iter_mut(&mut world) {
+        own.push((entity, material.clone()));
+        let material = &mut *material;
+        for surface in std::iter::once(&mut material.front).chain(&mut material.back) {
+            (surface.ambient, surface.diffuse, surface.specular) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        }
+        material.mirror = Vec3::ZERO;
+    }
+    let (mut baked, _) = bake_world(conditions, world, options, None, told)?;
+    for (entity, material) in own {
+        if let Ok(mut entity) = baked.world.get_entity_mut(entity) {
+            entity.insert(material);
+        }
+    }
+    Ok(baked)
 }
 
 /// Returns a callback that reports the progress of a bake; `told` are the fractions of the study that are

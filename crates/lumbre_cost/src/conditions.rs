@@ -10,6 +10,7 @@ use lumbre_render::{Gpu, Renderer};
 use crate::command_line::quoted;
 use crate::converged::ConvergedBakes;
 use crate::rounds::Rounds;
+use crate::shared_bake::SharedBakes;
 
 use crate::{CostError, Spread};
 
@@ -32,6 +33,8 @@ pub struct Conditions<'a> {
     pub pictures: &'a RefCell<Renderer>,
     /// Converged bakes that earlier studies of the report have made.
     pub converged: &'a ConvergedBakes,
+    /// Other bakes that earlier studies of the report have made.
+    pub bakes: &'a SharedBakes,
     /// Whether to measure fewer points and rounds.
     pub quick: bool,
     /// Whether only counts are wanted: nothing is timed or compared, and whatever serves only that is done

@@ -29,6 +29,7 @@
 
 mod all_pairs;
 mod baked;
+mod bounce_by_bounce;
 mod clustered_mesh;
 mod command_line;
 mod comparison;
@@ -55,6 +56,7 @@ mod rounds;
 mod run;
 mod scene_file;
 mod scenes;
+mod shared_bake;
 mod spread;
 mod studies;
 mod table;

@@ -12,6 +12,7 @@ use crate::compile_ahead::device_ahead;
 use crate::converged::ConvergedBakes;
 use crate::folder::{Folder, has_pictures};
 use crate::machine::machine;
+use crate::shared_bake::SharedBakes;
 use crate::studies::{STUDIES, StudyKind};
 use crate::{Conditions, CostError, CostReport, Machine, Settings, Study};
 
@@ -79,7 +80,7 @@ pub fn measure(
     });
     let mut report = CostReport { machine, settings, studies };
     let of = options.studies.len();
-    let converged = ConvergedBakes::default();
+    let (converged, bakes) = (ConvergedBakes::default(), SharedBakes::default());
     let ahead = device_ahead(gpu).filter(|_| !options.counts_only);
     for (number, kind) in options.studies.iter().enumerate() {
         if report.study(kind.name).is_some() {
@@ -93,6 +94,7 @@ pub fn measure(
             ahead: ahead.as_ref(),
             pictures: &pictures,
             converged: &converged,
+            bakes: &bakes,
             quick: options.quick,
             counts_only: options.counts_only,
             counts_lights: !options.counts_only,

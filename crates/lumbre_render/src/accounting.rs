@@ -7,6 +7,7 @@ use std::fmt::Write;
 
 use lumbre_graph::{GpuTime, GraphReport, Invocations};
 
+use crate::lightmap_texels::LightmapMemory;
 use crate::statistics::{CpuStages, Uploads};
 
 /// What a frame cost, and where.
@@ -51,6 +52,8 @@ pub struct Accounting {
     pub effects: Vec<EffectAccount>,
     /// What was uploaded, by kind.
     pub uploads: Uploads,
+    /// The lightmaps that the renderer keeps on the device, with their format.
+    pub lightmaps: LightmapMemory,
     /// What could not be measured, and why.
     pub notes: Vec<String>,
 }
@@ -139,6 +142,7 @@ pub(crate) struct EffectShare {
 pub(crate) struct FrameShares {
     pub stages: CpuStages,
     pub uploads: Uploads,
+    pub lightmaps: LightmapMemory,
     pub effects: Vec<EffectShare>,
     /// Pipelines of lit surfaces.
     pub pipelines_made: usize,
@@ -189,6 +193,7 @@ impl Accounting {
             effects: by_effect(shares, &passes),
             passes,
             uploads: shares.uploads,
+            lightmaps: shares.lightmaps,
             notes: report.notes.clone(),
         }
     }
@@ -261,6 +266,9 @@ impl Accounting {
         self.write_passes(&mut text);
         self.write_sum(&mut text);
         self.write_effects(&mut text);
+        if self.lightmaps.textures > 0 {
+            let _ = writeln!(text, "lightmaps on the device: {}", self.lightmaps);
+        }
         for note in &self.notes {
             let _ = writeln!(text, "note: {note}");
         }
@@ -443,6 +451,7 @@ mod tests {
         FrameShares {
             stages: CpuStages { objects_ms: 1.0, encoding_ms: 2.0, total_ms: 3.5, ..CpuStages::default() },
             uploads: Uploads { lights: 100, shadows: 40, effects: 2, ..Uploads::default() },
+            lightmaps: LightmapMemory::default(),
             effects: vec![effect("shadow maps", 40), effect("forward", 0), effect("glow", 2)],
             pipelines_made: 4,
         }

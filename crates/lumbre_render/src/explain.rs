@@ -20,10 +20,11 @@ use crate::frame_bindings::FrameBindings;
 use crate::frame_graph::{Last, declare};
 use crate::frame_plan::{Ending, FramePlan};
 use crate::g_buffer::DeferredVariants;
+use crate::lightmap_texels::{LightmapMemory, lightmaps_of};
 use crate::shader::Feature;
 use crate::shading_by_need::{Conditions, WorldNeeds, is_shaded_by_need};
 use crate::shading_need::ShadingNeed;
-use crate::{FrameOptions, RenderError, Renderer};
+use crate::{FrameOptions, Gpu, RenderError, Renderer};
 
 /// The explanation of a scene's frame.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -40,6 +41,8 @@ pub struct SceneExplanation {
     pub light_lists: Vec<String>,
     /// What was chosen for objects that are shaded by need, and why; empty if there are none.
     pub shading_by_need: Vec<ShadingNeed>,
+    /// The lightmaps on the device, with their format.
+    pub lightmaps: LightmapMemory,
     /// Each shader variant in use with the number of objects it draws.
     pub variants: BTreeMap<String, usize>,
     /// What each effect costs, if it has been measured (see [`crate::effect_costs`]).
@@ -57,7 +60,15 @@ pub fn explain(
     width: u32,
     height: u32,
 ) -> Result<SceneExplanation, RenderError> {
-    explain_with(world, &mut effects::own(&[]), (options, false), width, height)
+    let device = Device { is_software: false, features: Gpu::OPTIONAL_FEATURES };
+    explain_with(world, &mut effects::own(&[]), (options, device), width, height)
+}
+
+/// What an explanation has to know about a device.
+#[derive(Clone, Copy)]
+struct Device {
+    is_software: bool,
+    features: wgpu::Features,
 }
 
 impl Renderer {
@@ -74,19 +85,21 @@ impl Renderer {
         height: u32,
     ) -> Result<SceneExplanation, RenderError> {
         let options = self.possible(options);
-        let software = self.gpu().is_software();
-        explain_with(world, self.effects_mut(), (&options, software), width, height)
+        let gpu = self.gpu();
+        let device = Device { is_software: gpu.is_software(), features: gpu.device.features() };
+        explain_with(world, self.effects_mut(), (&options, device), width, height)
     }
 }
 
-/// Like [`explain`], for a frame with these effects. `software` is true for a software rasterizer.
+/// Like [`explain`], for a frame with these effects on this device.
 fn explain_with(
     world: &mut World,
     effects: &mut [Box<dyn Effect>],
-    (options, software): (&FrameOptions, bool),
+    (options, device): (&FrameOptions, Device),
     width: u32,
     height: u32,
 ) -> Result<SceneExplanation, RenderError> {
+    let software = device.is_software;
     let target_format = wgpu::TextureFormat::Rgba8Unorm;
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
     let mut lights = LightSet::of(world, options.shadows)?;
@@ -148,6 +161,7 @@ fn explain_with(
         rendering_path,
         light_lists,
         shading_by_need: needs.groups(),
+        lightmaps: lightmaps_of(world, device.features, settings.frame.lightmap_format),
         variants,
         cost: None,
     })
@@ -178,6 +192,9 @@ impl SceneExplanation {
         }
         let objects: usize = self.variants.values().sum();
         let _ = writeln!(text, "\n  {} shader variants for {objects} objects", self.variants.len());
+        if self.lightmaps.textures > 0 {
+            let _ = writeln!(text, "  lightmaps on the device: {}", self.lightmaps);
+        }
         self.write_needs(&mut text);
         text + &self.account()
     }
@@ -228,6 +245,9 @@ impl SceneExplanation {
         text.push_str("\nLight lists\n");
         for line in &self.light_lists {
             let _ = writeln!(text, "  {line}");
+        }
+        if self.lightmaps.textures > 0 {
+            let _ = writeln!(text, "\nLightmaps on the device\n  {}", self.lightmaps);
         }
         self.write_needs(&mut text);
         text.push_str("\nShader variants\n");

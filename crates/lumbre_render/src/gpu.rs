@@ -51,8 +51,8 @@ const MIN_LIMITS: [LeastLimit; 4] = [
 impl Gpu {
     /// Features that are used if a device has them; none is required. They are queries for measurements,
     /// shaders that count lights ([`Measure::Lights`](crate::Measure)), subgroups in which the fragments of a
-    /// software rasterizer load lights for each other, and blending and multisampling of 32-bit floats for
-    /// frames with full precision.
+    /// software rasterizer load lights for each other, blending and multisampling of 32-bit floats for
+    /// frames with full precision, and their filtering for lightmaps of 32-bit floats.
     pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
         .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
         .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES)
@@ -61,6 +61,7 @@ impl Gpu {
         .union(wgpu::Features::SHADER_EARLY_DEPTH_TEST)
         .union(wgpu::Features::SUBGROUP)
         .union(wgpu::Features::FLOAT32_BLENDABLE)
+        .union(wgpu::Features::FLOAT32_FILTERABLE)
         .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
 
     /// Wraps a device that a program has created itself. `wgpu::Limits::default()` without any feature is

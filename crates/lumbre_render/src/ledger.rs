@@ -108,12 +108,14 @@ impl OpenFrame {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lightmap_texels::LightmapMemory;
     use crate::statistics::{CpuStages, Uploads};
 
     fn frame(frame: u64, counts_lights: bool) -> OpenFrame {
         let shares = FrameShares {
             stages: CpuStages::default(),
             uploads: Uploads::default(),
+            lightmaps: LightmapMemory::default(),
             effects: Vec::new(),
             pipelines_made: 0,
         };

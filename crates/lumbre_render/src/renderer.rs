@@ -677,6 +677,7 @@ impl Renderer {
             pipelines_made: self.pipelines.made(),
             pipelines_awaited: 0,
             uploads,
+            lightmaps: self.textures.lightmap_memory(),
         })
     }
 
@@ -761,6 +762,7 @@ impl Renderer {
                 let shares = FrameShares {
                     stages: frame.statistics.cpu,
                     uploads: frame.statistics.uploads,
+                    lightmaps: frame.statistics.lightmaps,
                     effects,
                     pipelines_made: frame.statistics.pipelines_made.saturating_sub(self.pipelines_before),
                 };

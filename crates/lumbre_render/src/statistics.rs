@@ -2,6 +2,7 @@
 
 use lumbre_graph::ExecutionStages;
 
+use crate::lightmap_texels::LightmapMemory;
 use crate::shading_need::ShadingNeeds;
 
 /// Counts of one frame.
@@ -45,6 +46,8 @@ pub struct Statistics {
     pub cpu: CpuStages,
     /// What was uploaded for this frame, by kind.
     pub uploads: Uploads,
+    /// The lightmaps that the renderer keeps on the device.
+    pub lightmaps: LightmapMemory,
 }
 
 /// Bytes uploaded to the GPU for one frame. The frame's own uniform, some two hundred bytes, is not counted.

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumbre_scene::{Image, Lightmap, MaterialTextures, Mipmap, Sampler, Wrap};
+use lumbre_scene::{Image, Lightmap, LightmapEncoding, MaterialTextures, Mipmap, Sampler, Wrap};
 
 use wgpu::util::DeviceExt;
 
@@ -42,7 +42,7 @@ pub(crate) struct TextureSets {
     layouts: HashMap<u8, wgpu::BindGroupLayout>,
     sets: HashMap<SetKey, Arc<TextureSet>>,
     lightmap_layout: Option<wgpu::BindGroupLayout>,
-    lightmaps: HashMap<usize, Arc<wgpu::BindGroup>>,
+    lightmaps: HashMap<(usize, LightmapEncoding), Arc<wgpu::BindGroup>>,
 }
 
 /// Returns every texture feature, and whether a mask contains it.
@@ -106,19 +106,20 @@ impl TextureSets {
         self.lightmap_layout.get_or_insert_with(|| layout_of(gpu, &[0], false)).clone()
     }
 
-    /// Returns the group of a lightmap.
+    /// Returns the group of a lightmap, stored in this format.
     pub fn lightmap(
         &mut self,
         gpu: &Gpu,
         textures: &mut Textures,
         lightmap: &Lightmap,
+        format: LightmapEncoding,
     ) -> Result<Arc<wgpu::BindGroup>, RenderError> {
-        let key = Arc::as_ptr(&lightmap.image) as usize;
+        let key = (Arc::as_ptr(&lightmap.image) as usize, format);
         if let Some(group) = self.lightmaps.get(&key) {
             return Ok(Arc::clone(group));
         }
         let layout = self.lightmap_layout(gpu);
-        let view = textures.lightmap(gpu, &lightmap.image)?;
+        let view = textures.lightmap(gpu, &lightmap.image, format)?;
         let (wrap_u, wrap_v) = (Wrap::ClampToEdge, Wrap::ClampToEdge);
         let sampler =
             textures.sampler(gpu, &Sampler { wrap_u, wrap_v, mipmap: Mipmap::None, ..Sampler::default() });

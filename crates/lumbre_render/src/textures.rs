@@ -4,10 +4,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use half::f16;
 use lumbre_optics::{decode_srgb_byte, encode_srgb};
-use lumbre_scene::{Image, LightmapImage, Mipmap, Sampler, Wrap};
+use lumbre_scene::{Image, LightmapEncoding, LightmapImage, Mipmap, Sampler, Wrap};
 
+use crate::lightmap_texels::{LightmapMemory, encode, filterable, texel_bytes, texture_format};
 use crate::mip_level::{MipLevel, box_filter_2d};
 use crate::normal_map::normal_levels;
 use crate::{Gpu, RenderError};
@@ -27,7 +27,7 @@ pub(crate) enum Texels {
 #[derive(Debug, Default)]
 pub(crate) struct Textures {
     images: HashMap<(usize, Texels), (Arc<Image>, wgpu::TextureView)>,
-    lightmaps: HashMap<usize, (Arc<LightmapImage>, wgpu::TextureView)>,
+    lightmaps: HashMap<(usize, LightmapEncoding), (Arc<LightmapImage>, wgpu::TextureView)>,
     samplers: HashMap<Sampler, wgpu::Sampler>,
     /// Bytes of textures and of lightmaps that were uploaded since `take_uploaded` was last called.
     uploaded: u64,
@@ -53,21 +53,23 @@ impl Textures {
         Ok(entry.or_insert_with(new).1.clone())
     }
 
-    /// Returns the view of a lightmap, which stores E/π with f16 per channel.
+    /// Returns the view of a lightmap, which stores E/π in this format, or in half floats if the device cannot
+    /// filter that.
     pub fn lightmap(
         &mut self,
         gpu: &Gpu,
         image: &Arc<LightmapImage>,
+        format: LightmapEncoding,
     ) -> Result<wgpu::TextureView, RenderError> {
         check(&image.name, image.width, image.height, image.texels.len(), 1)?;
         let limit = gpu.device.limits().max_texture_dimension_2d;
         if image.width > limit || image.height > limit {
             return Err(RenderError::TargetTooLarge { width: image.width, height: image.height, limit });
         }
-        let key = Arc::as_ptr(image) as usize;
-        let entry = self.lightmaps.entry(key);
+        let format = filterable(gpu.device.features(), format);
+        let entry = self.lightmaps.entry((Arc::as_ptr(image) as usize, format));
         let new = || {
-            let (view, bytes) = upload_lightmap(gpu, image);
+            let (view, bytes) = upload_lightmap(gpu, image, format);
             self.uploaded_lightmaps += bytes;
             (Arc::clone(image), view)
         };
@@ -84,10 +86,18 @@ impl Textures {
         [std::mem::take(&mut self.uploaded), std::mem::take(&mut self.uploaded_lightmaps)]
     }
 
-    /// Drops images that nothing else uses.
-    pub fn sweep(&mut self) {
+    /// Drops images that nothing else uses, and lightmaps in another format than this.
+    pub fn sweep(&mut self, gpu: &Gpu, format: LightmapEncoding) {
+        let format = filterable(gpu.device.features(), format);
         self.images.retain(|_, (image, _)| Arc::strong_count(image) > 1);
-        self.lightmaps.retain(|_, (image, _)| Arc::strong_count(image) > 1);
+        self.lightmaps.retain(|(_, own), (image, _)| *own == format && Arc::strong_count(image) > 1);
+    }
+
+    /// Returns the memory of the lightmaps. All of them have the same format, except within a frame that
+    /// changes it.
+    pub fn lightmap_memory(&self) -> LightmapMemory {
+        let format = self.lightmaps.keys().next().map_or_else(Default::default, |(_, format)| *format);
+        LightmapMemory::of(format, self.lightmaps.values().map(|(image, _)| [image.width, image.height]))
     }
 }
 
@@ -149,14 +159,11 @@ fn upload(gpu: &Gpu, image: &Image, texels: Texels) -> (wgpu::TextureView, u64) 
 }
 
 /// Returns the view of a lightmap's copy, and its bytes.
-fn upload_lightmap(gpu: &Gpu, image: &LightmapImage) -> (wgpu::TextureView, u64) {
-    // The largest f16 is 65504. A brighter texel belongs to a lamp and is clamped to that.
-    let half = |value: f32| f16::from_f32(value.clamp(0.0, f16::MAX.to_f32())).to_bits();
-    let texels: Vec<u16> =
-        image.texels.iter().flat_map(|t| [half(t.x), half(t.y), half(t.z), half(1.0)]).collect();
-    let texture = texture_2d(gpu, image.width, image.height, 1, wgpu::TextureFormat::Rgba16Float);
-    write(gpu, &texture, 0, image.width, image.height, 8, bytemuck::cast_slice(&texels));
-    (texture.create_view(&Default::default()), size_of_val(texels.as_slice()) as u64)
+fn upload_lightmap(gpu: &Gpu, image: &LightmapImage, format: LightmapEncoding) -> (wgpu::TextureView, u64) {
+    let texels = encode(image, format);
+    let texture = texture_2d(gpu, image.width, image.height, 1, texture_format(format));
+    write(gpu, &texture, 0, image.width, image.height, texel_bytes(format), &texels);
+    (texture.create_view(&Default::default()), texels.len() as u64)
 }
 
 fn texture_2d(

@@ -141,7 +141,7 @@ impl WarmUp {
                 let (name, encoding) = ("warm-up".to_owned(), LightmapEncoding::default());
                 let texels = vec![glam::Vec3::ZERO; 16];
                 let image = Arc::new(LightmapImage { name, width: 4, height: 4, texels, encoding });
-                Some(self.sets.lightmap(&self.gpu, &mut self.textures, &Lightmap { image })?)
+                Some(self.sets.lightmap(&self.gpu, &mut self.textures, &Lightmap { image }, encoding)?)
             }
             false => key
                 .variant
@@ -155,7 +155,7 @@ impl WarmUp {
         let groups = [Some(&frame), textures, baked_light.as_deref(), shadows.as_ref()];
         let drawn = self.submit(key, pipeline, groups);
         self.sets.sweep();
-        self.textures.sweep();
+        self.textures.sweep(&self.gpu, LightmapEncoding::default());
         drawn
     }
 

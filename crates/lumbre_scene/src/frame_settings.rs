@@ -1,9 +1,11 @@
-//! Quality settings that a level requests for its frames: multisampling, where lights end, and whether shadows
-//! are drawn, with their resolution and filter. They trade quality for speed in the rasterizer only; the baker and the ray tracer
+//! Quality settings that a level requests for its frames: multisampling, where lights end, whether shadows
+//! are drawn, with their resolution and filter, and the format of lightmaps on the GPU. They trade quality for speed in the rasterizer only; the baker and the ray tracer
 //! do not read them.
 
+use crate::LightmapEncoding;
+
 /// How frames of a scene are drawn where the program does not decide. The defaults are the most accurate
-/// choices, except that multisampling is left to the program.
+/// choices, except that multisampling is left to the program and lightmaps are half floats.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameSettings {
     /// Four samples per pixel (true) or one (false); `None` leaves the choice to the program.
@@ -20,6 +22,9 @@ pub struct FrameSettings {
     pub shadow_resolution: f32,
     /// How shadow maps are filtered.
     pub shadow_filter: ShadowFilter,
+    /// The format of lightmaps on the GPU, whatever that of their files. Texels are clamped by
+    /// [`LightmapEncoding::clamped`].
+    pub lightmap_format: LightmapEncoding,
 }
 
 /// How many texels of a shadow map are sampled per shaded point, and over which width.
@@ -55,6 +60,7 @@ impl Default for FrameSettings {
             shadows: true,
             shadow_resolution: 1.0,
             shadow_filter: ShadowFilter::Soft,
+            lightmap_format: LightmapEncoding::Rgb16Float,
         }
     }
 }

@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
+use crate::LightmapEncoding;
+
 /// A decoded RGBA image with the top row first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
@@ -31,20 +33,8 @@ pub struct LightmapImage {
     pub height: u32,
     /// `width * height` texels.
     pub texels: Vec<Vec3>,
-    /// How it is stored on disk and on the GPU.
+    /// How it is stored in its file. On the GPU it is stored as `FrameSettings::lightmap_format` says.
     pub encoding: LightmapEncoding,
-}
-
-/// Storage format of a lightmap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum LightmapEncoding {
-    /// f32 per channel.
-    Rgb32Float,
-    /// f16 per channel.
-    #[default]
-    Rgb16Float,
-    /// RGB9E5: 9-bit mantissas with a shared exponent.
-    Rgb9E5,
 }
 
 /// How texture coordinates outside [0, 1] are mapped.

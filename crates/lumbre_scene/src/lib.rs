@@ -45,6 +45,7 @@ mod frame_settings;
 mod gltf;
 mod hidden_cone;
 mod image;
+mod lightmap_encoding;
 mod lightmap_files;
 mod medium;
 mod quadric;
@@ -76,7 +77,8 @@ pub use gltf::{
     load_slice_within, load_with, save, save_baked, save_settings, save_with,
 };
 pub use hidden_cone::{HiddenCone, hidden_cones};
-pub use image::{Image, LightmapEncoding, LightmapImage, Mipmap, Sampler, TextureReference, Wrap};
+pub use image::{Image, LightmapImage, Mipmap, Sampler, TextureReference, Wrap};
+pub use lightmap_encoding::LightmapEncoding;
 pub use lightmap_files::{
     AmbientCube, EncodingError, IrradianceVolume, Ktx2Error, Ktx2Texture, LightmapFileError, PackedFormat,
     Supercompression, lightmap_to_ktx2, lightmap_to_open_exr,

@@ -508,13 +508,14 @@ fn what_a_level_asks_of_its_frames() {
         file.root["scenes"][0]["extensions"] = json!({"LUMBRE_scene": {"frame": frame}});
         file.load().map(|(world, _)| world.resource::<SceneSettings>().frame)
     };
-    let all = json!({"multisample": true, "lightThreshold": 0.02, "shadows": false, "shadowResolution": 0.25, "shadowFilter": "hard"});
+    let all = json!({"multisample": true, "lightThreshold": 0.02, "shadows": false, "shadowResolution": 0.25, "shadowFilter": "hard", "lightmapFormat": "rgb9e5"});
     let expected = FrameSettings {
         multisample: Some(true),
         light_threshold: 0.02,
         shadows: false,
         shadow_resolution: 0.25,
         shadow_filter: ShadowFilter::Hard,
+        lightmap_format: LightmapEncoding::Rgb9E5,
     };
     assert_eq!(loaded(all).unwrap(), expected);
     assert_eq!(loaded(json!({})).unwrap(), FrameSettings::default());
@@ -523,6 +524,7 @@ fn what_a_level_asks_of_its_frames() {
         (json!({"shadowResolution": 0.0}), ["LUMBRE_scene.frame.shadowResolution", "0.0625 to 4"]),
         (json!({"shadowResolution": 5}), ["LUMBRE_scene.frame.shadowResolution", "0.0625 to 4"]),
         (json!({"shadowFilter": "blurred"}), ["\"blurred\"", "hard, percentage-closer, soft"]),
+        (json!({"lightmapFormat": "rgb8"}), ["\"rgb8\"", "rgb32f, rgb16f, rgb9e5"]),
     ] {
         let error = loaded(bad).unwrap_err().to_string();
         assert!(words.iter().all(|word| error.contains(word)), "{error}");

@@ -79,6 +79,7 @@ fn everything() -> World {
             shadows: false,
             shadow_resolution: 2.0,
             shadow_filter: ShadowFilter::PercentageCloser,
+            lightmap_format: LightmapEncoding::Rgb32Float,
         },
     });
     let (shared, other) = (triangle(0.0), triangle(5.0));

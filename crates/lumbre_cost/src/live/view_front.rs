@@ -69,7 +69,7 @@ impl ViewFront {
 #[cfg(test)]
 mod tests {
     use lumbre_optics::Shading;
-    use lumbre_scene::ShadowFilter;
+    use lumbre_scene::{LightmapEncoding, ShadowFilter};
 
     use super::*;
 
@@ -82,6 +82,7 @@ mod tests {
             light_threshold: 0.0,
             multisample: true,
             lightmap_reduction: 1,
+            lightmap_format: LightmapEncoding::Rgb16Float,
         };
         let times = [0.98 * milliseconds, milliseconds, 1.02 * milliseconds];
         let milliseconds = Spread::of(&times).expect("there are times");

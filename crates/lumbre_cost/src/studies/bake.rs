@@ -3,16 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use bevy_ecs::prelude::*;
-use glam::Vec3;
 use lumbre_bake::{BakeOptions, Quality};
-use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
 
 use super::over_scenes;
 use crate::baked::{
-    Baked, bake_arguments, bake_options, bake_scene, bake_world, maps_of, nothing_to_bake, picture_of_maps,
-    texel_error,
+    bake_arguments, bake_direct_light, bake_options, bake_scene, few_bakes, maps_of, nothing_to_bake,
+    picture_of_maps, texel_error,
 };
 use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{cheapest_by_error, counted, error_of, listed, percent, rounded, short, times_of};
@@ -31,6 +28,8 @@ pub(super) const ERROR: f64 = 0.02;
 pub(super) const QUICK_ERROR: f64 = 0.06;
 /// Time limit of the converged bake in a quick report, the same as in other studies, so that they share it.
 pub(super) const REFERENCE_SECONDS: f64 = 1.5;
+/// The same where each bake takes seconds, of which this one would otherwise have none left for its rays.
+const SECONDS_OF_MANY_TRIANGLES: f64 = 6.0;
 /// Sides of patches in texels; the default of this quality is 4.
 const PATCHES: &[f32] = &[16.0, 8.0, 2.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];
@@ -42,6 +41,11 @@ const STATED: &str = "error stated, % of the mean";
 /// The statement that a request is about: the larger one of the whole level's error and that in its worst view.
 const STATED_AT_MOST: &str = "error stated, whole or in the worst view, %";
 const FOUND: &str = "error found, % of the mean";
+
+/// The time limit of the converged bake in a quick report, which may make few bakes because each takes seconds.
+pub(super) fn reference_seconds(few: bool) -> f64 {
+    if few { SECONDS_OF_MANY_TRIANGLES } else { REFERENCE_SECONDS }
+}
 
 /// Runs the study.
 ///
@@ -90,8 +94,10 @@ struct Asked {
     bounces: bool,
 }
 
-fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
+/// The bakes that are compared; fewer if each of them takes seconds in a quick report.
+fn asked(conditions: &Conditions<'_>, options: BakeOptions, few: bool) -> Vec<Asked> {
     let errors = conditions.unless_quick(ERRORS, FEW_ERRORS);
+    let errors = if few { &errors[..1] } else { errors };
     let label = |error: f64| format!("error {} %", short(100.0 * error));
     let mut all: Vec<Asked> = Vec::new();
     for &error in errors {
@@ -113,7 +119,8 @@ fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
     });
     // With the least requested error, the remaining error is due to the patches.
     let least = errors.last().copied().unwrap_or(options.error);
-    for &texels in conditions.unless_quick(PATCHES, FEW_PATCHES) {
+    let patches = conditions.unless_quick(PATCHES, FEW_PATCHES);
+    for &texels in if few { &[] } else { patches } {
         let options = BakeOptions { error: least, patch_texels: Some(texels), ..options };
         all.push(Asked {
             series: "patches",
@@ -124,7 +131,7 @@ fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
         });
     }
     // The command line has no option for bakes without smoothing.
-    for &error in errors.iter().take(conditions.unless_quick(2, 1)) {
+    for &error in errors.iter().take(if few { 0 } else { conditions.unless_quick(2, 1) }) {
         let options = BakeOptions { error, denoise: false, ..options };
         all.push(Asked {
             series: "without smoothing",
@@ -149,10 +156,14 @@ fn of_scene(
         measured.study.notes.push(why);
         return Ok(());
     }
+    let few = few_bakes(conditions, scene)?;
+    measured.study.notes.extend(few.iter().map(|why| {
+        format!("{why} It bakes for one error only, each bake once, and not with other patches or without smoothing.")
+    }));
     let options = bake_options(conditions, scene, conditions.unless_quick(2_500.0, 700.0))?;
     let part = |share: f64| before + share * (after - before);
     let options_of_truth =
-        converged(conditions, &options, conditions.reference_time(12.0, REFERENCE_SECONDS));
+        converged(conditions, &options, conditions.reference_time(12.0, reference_seconds(few.is_some())));
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.0), part(0.4)])?;
     measured.study.notes.push(format!(
         "The converged bake of the {} took {:.0} s and states an error of {} of its mean.",
@@ -164,13 +175,14 @@ fn of_scene(
     let reference_maps =
         measured.keep_reference(&format!("{} converged maps", scene.name), picture_of_maps(&truth.maps));
 
-    let all = asked(conditions, options);
-    let done = repeated(all.len(), conditions.repetitions(), |place, [from, to]| {
+    let all = asked(conditions, options, few.is_some());
+    let repetitions = if few.is_some() { 1 } else { conditions.repetitions() };
+    let done = repeated(all.len(), repetitions, |place, [from, to]| {
         let told = [from, to].map(|share| part(0.4 + 0.6 * share));
         let asked = &all[place];
         let baked = match asked.bounces {
             true => bake_scene(conditions, scene, &asked.options, told)?,
-            false => bake_without_bounces(conditions, scene, &asked.options, told)?,
+            false => bake_direct_light(conditions, scene, &asked.options, told)?,
         };
         Ok((1e3 * baked.report.seconds, baked))
     })?;
@@ -210,34 +222,6 @@ fn of_scene(
     let findings = findings(scene, &points);
     measured.study.findings.extend(findings);
     Ok(())
-}
-
-/// Bakes a scene whose surfaces reflect nothing while it is baked. A lightmap holds the light that arrives, so that
-/// each surface still gets its direct light.
-fn bake_without_bounces(
-    conditions: &Conditions<'_>,
-    scene: &SceneFile,
-    options: &BakeOptions,
-    told: [f64; 2],
-) -> Result<Baked, CostError> {
-    let mut world = scene.open(conditions.aspect())?;
-    let mut materials = world.query::<(Entity, &mut Material)>();
-    let mut own: Vec<(Entity, Material)> = Vec::new();
-    for (entity, mut material) in materials.iter_mut(&mut world) {
-        own.push((entity, material.clone()));
-        let material = &mut *material;
-        for surface in std::iter::once(&mut material.front).chain(&mut material.back) {
-            (surface.ambient, surface.diffuse, surface.specular) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-        }
-        material.mirror = Vec3::ZERO;
-    }
-    let (mut baked, _) = bake_world(conditions, world, options, None, told)?;
-    for (entity, material) in own {
-        if let Ok(mut entity) = baked.world.get_entity_mut(entity) {
-            entity.insert(material);
-        }
-    }
-    Ok(baked)
 }
 
 fn parameters(asked: &Asked) -> BTreeMap<String, f64> {

@@ -2,27 +2,29 @@
 //! lamps infinitely far away, what a highlight adds, the three shadings on table 1.1's sphere, radiosity beside
 //! ray tracing, and form factors of all pairs of patches.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
-use lumbre_bake::BakeOptions;
+use lumbre_bake::{BakeOptions, BakeReport};
 use lumbre_optics::{Lobe, ReflectionModel, Shading};
 use lumbre_render::FrameOptions;
 
-use super::bake::{ERROR, QUICK_ERROR};
+use super::bake::{ERROR, QUICK_ERROR, REFERENCE_SECONDS};
 use super::shading::series_of;
 use crate::all_pairs::CubeOfPatches;
-use crate::baked::{bake_arguments, bake_options, bake_scene};
+use crate::baked::{Baked, bake_arguments, bake_options, bake_scene, maps_of, picture_of_maps, texel_error};
+use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{
     counted, error_of, factor, listed, milliseconds, percent, ratio_of, rounded, short, times_of,
 };
 use crate::frame::Frame;
-use crate::frames::{DrawnFrame, draw_frames};
+use crate::frames::{DrawnFrame, draw_frames, draw_picture};
 use crate::measured::Measured;
 use crate::picture::Picture;
 use crate::rounds::{Repeated, milliseconds_since, repeated};
 use crate::scene_file::SceneFile;
 use crate::scenes::{Air, Ball, LAMPS, LitSphere, ball_of_table, exact_ball, lit_sphere, room};
-use crate::traced::{lighting_of, ray_tree, traced};
+use crate::traced::{lighting_of, ray_tree, traced, traced_world};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Distances of the eye and of the lamps from the centre of the sphere, in radii.
@@ -36,12 +38,15 @@ const BRIGHTEST: &str = "brightest pixel, % of the exact sphere's";
 /// Patches along a side of the cube: about 1, 2, 4 and 8 times as many patches.
 const SIDES: &[u32] = &[8, 11, 16, 23];
 const FEW_SIDES: &[u32] = &[4, 6, 8, 11];
+const OPPOSITE: &str = "form factor of opposite sides";
+const ADJACENT: &str = "form factor of adjacent sides";
 const OFF: &str = "farthest sum of form factors from 1, %";
 /// Sides of the baker's patches in texels, coarse to fine.
 const PATCHES: &[f32] = &[16.0, 4.0, 2.0, 1.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];
 /// Approximate number of texels of the bakes.
 const TEXELS: f64 = 2_500.0;
+const FEW_TEXELS: f64 = 700.0;
 const PAIRS: &str = "form factors of all pairs";
 const BAKES: &str = "bakes by size of patches";
 const BAKE: &str = "radiosity";
@@ -80,7 +85,7 @@ fn study() -> Study {
         name: "documents".into(),
         title: "What the documents say about cost".into(),
         question: "A viewer and light sources infinitely far away are said to be cheaper, highlights to add little, flat shading to be the simplest, radiosity to be slower than ray tracing, and form factors to cost the square of the number of patches. How much are these, and what do they lose?".into(),
-        reference: "the same frame with a local viewer, with point lamps, or with highlights; for table 1.1's sphere, the exact sphere traced in f64, over the pixels that show it in both pictures".into(),
+        reference: "the same frame with a local viewer, with point lamps, or with highlights; for table 1.1's sphere, the exact sphere traced in f64, over the pixels that show it in both pictures; for bakes, a converged bake of the same texels, whose own noise is subtracted; for the picture by the ray tree, which has no interreflected light, the ray tree's picture of the baked room; for form factors of all pairs, those between the sides of a cube in closed form (Howell, C-11 and C-14)".into(),
         plots: vec![
             plot(
                 "What is lost if the viewer or the lamps are infinitely far away",
@@ -252,6 +257,12 @@ fn findings_of_frames(points: &[Point], drawn: &[DrawnFrame]) -> Vec<String> {
     [viewer, lamps, highlights(), shadings()].into_iter().flatten().collect()
 }
 
+/// What a work leaves: a baked room, or a picture with the number of its rays.
+enum Made {
+    Baked(Box<Baked>),
+    Traced(Picture, u64),
+}
+
 /// What is done with the room: a bake, or a picture by the ray tree.
 struct Work {
     series: &'static str,
@@ -269,7 +280,7 @@ fn of_radiosity(
     let scene = SceneFile::made(conditions, "room", room(Air::Clear))?;
     let options = BakeOptions {
         error: conditions.unless_quick(ERROR, QUICK_ERROR),
-        ..bake_options(conditions, &scene, TEXELS)?
+        ..bake_options(conditions, &scene, conditions.unless_quick(TEXELS, FEW_TEXELS))?
     };
     let by_patch = |&texels: &f32| Work {
         series: BAKES,
@@ -281,51 +292,89 @@ fn of_radiosity(
     let patches = conditions.unless_quick(PATCHES, FEW_PATCHES);
     let all: Vec<Work> = [usual, picture].into_iter().chain(patches.iter().map(by_patch)).collect();
     let part = |share: f64| before + share * (after - before);
+    // The study of bakes has the same reference.
+    let time = conditions.reference_time(12.0, REFERENCE_SECONDS);
+    let truth =
+        converged_bake(conditions, &scene, &converged(conditions, &options, time), [part(0.0), part(0.3)])?;
     let done = repeated(all.len(), conditions.repetitions(), |place, told| {
         let Some(options) = &all[place].bake else {
-            let (_, report) = traced(conditions, &scene, &ray_tree(conditions))?;
-            return Ok((1e3 * report.seconds, vec![("rays", report.rays as f64)]));
+            let (picture, report) = traced(conditions, &scene, &ray_tree(conditions))?;
+            return Ok((1e3 * report.seconds, Made::Traced(picture, report.rays)));
         };
-        let report = bake_scene(conditions, &scene, options, told.map(part))?.report;
-        let counts = vec![
-            ("rays", report.rays as f64),
-            ("texels", report.texels as f64),
-            ("patches", report.patches as f64),
-            ("form factors", report.form_factors as f64),
-            (ITERATIONS, f64::from(report.iterations.into_iter().max().unwrap_or_default())),
-        ];
-        Ok((1e3 * report.seconds, counts))
+        let baked = bake_scene(conditions, &scene, options, told.map(|share| part(0.3 + 0.7 * share)))?;
+        Ok((1e3 * baked.report.seconds, Made::Baked(Box::new(baked))))
     })?;
+    let first = measured.study.points.len();
+    let frame_of_truth = measured.keep_reference("room converged", truth.picture.clone());
+    let maps_of_truth = measured.keep_reference("room converged maps", picture_of_maps(&truth.maps));
+    let mut rays_of_baked = None;
     for (work, Repeated { times, made }) in all.iter().zip(done) {
         let file = scene.in_commands();
-        let command = match &work.bake {
-            Some(options) => format!("lumbre bake {file} -o baked.glb {}", bake_arguments(options)),
-            None => format!("lumbre trace {file} -o traced.exr --size {}", conditions.size_text()),
-        };
-        measured.study.points.push(Point {
+        let point = Point {
             series: work.series.to_owned(),
             label: work.label.clone(),
             milliseconds: Spread::of(&times),
-            counts: made.into_iter().map(|(name, count)| (name.to_owned(), count)).collect(),
-            command,
             ..Point::default()
-        });
+        };
+        match made {
+            Made::Baked(mut baked) => {
+                let arguments = bake_arguments(work.bake.as_ref().unwrap_or(&options));
+                let maps = maps_of(&mut baked.world);
+                let point = Point {
+                    counts: counts_of(&baked.report),
+                    error: texel_error(&maps, &truth.maps),
+                    command: format!("lumbre bake {file} -o baked.glb {arguments}"),
+                    ..point
+                };
+                let frame = draw_picture(conditions, &mut baked.world, &FrameOptions::default())?;
+                let maps = (picture_of_maps(&maps), maps_of_truth.as_str());
+                measured.add_maps(point, (frame, &frame_of_truth), maps)?;
+                if rays_of_baked.is_none() {
+                    rays_of_baked =
+                        Some(traced_world(conditions, &mut baked.world, &ray_tree(conditions))?.0);
+                }
+            }
+            Made::Traced(picture, rays) => {
+                let reference = rays_of_baked.clone().unwrap_or_else(|| picture.clone());
+                let reference = measured.keep_reference("room baked by the ray tree", reference);
+                let point = Point {
+                    counts: [("rays".to_owned(), rays as f64)].into(),
+                    command: format!("lumbre trace {file} -o traced.exr --size {}", conditions.size_text()),
+                    ..point
+                };
+                measured.add_picture(point, picture, &reference, ErrorOver::Picture)?;
+            }
+        }
     }
-    let points = &measured.study.points;
+    let points = &measured.study.points[first..];
     let findings = [finding_of_radiosity(points), finding_of_solver(points)];
     measured.study.findings.extend(findings.into_iter().flatten());
     Ok(())
 }
 
+fn counts_of(report: &BakeReport) -> BTreeMap<String, f64> {
+    let counts = [
+        ("rays", report.rays as f64),
+        ("texels", report.texels as f64),
+        ("patches", report.patches as f64),
+        ("form factors", report.form_factors as f64),
+        (ITERATIONS, f64::from(report.iterations.into_iter().max().unwrap_or_default())),
+    ];
+    counts.map(|(name, count)| (name.to_owned(), count)).into()
+}
+
 /// Compares the bake with one picture.
 fn finding_of_radiosity(points: &[Point]) -> Option<String> {
-    let time = |series: &str| points.iter().find(|point| point.series == series)?.milliseconds;
-    let (bake, picture) = (time(BAKE)?, time(PICTURE)?);
+    let of = |series: &str| points.iter().find(|point| point.series == series);
+    let (of_bake, of_picture) = (of(BAKE)?, of(PICTURE)?);
+    let (bake, picture) = (of_bake.milliseconds?, of_picture.milliseconds?);
     Some(format!(
-        "Baking the room takes {}, one picture of it by the ray tree {}: {}. A bake is done once for any number of frames, while rays are cast again for each picture.",
+        "Baking the room takes {}, one picture of it by the ray tree {}: {}. A bake is done once for any number of frames, while rays are cast again for each picture. The error of the baked light is {}, that of the picture, which lacks the light between surfaces, {}.",
         milliseconds(&bake),
         milliseconds(&picture),
-        times_of(&bake, &picture)
+        times_of(&bake, &picture),
+        error_of(&of_bake.error?),
+        error_of(&of_picture.error?)
     ))
 }
 
@@ -369,7 +418,13 @@ fn of_all_pairs(
             label: format!("{} patches", cube.len()),
             milliseconds: Spread::of(&times),
             counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
-            figures: [(OFF.to_owned(), 100.0 * made.off)].into(),
+            error: Some(made.error()),
+            figures: [
+                (OFF.to_owned(), 100.0 * made.off),
+                (OPPOSITE.to_owned(), made.between_opposite),
+                (ADJACENT.to_owned(), made.between_adjacent),
+            ]
+            .into(),
             command: conditions.again("documents"),
             ..Point::default()
         });

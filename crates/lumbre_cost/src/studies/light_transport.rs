@@ -13,7 +13,7 @@ use lumbre_trace::{Integrator, TraceOptions};
 
 use super::bake::{ERROR, QUICK_ERROR};
 use super::over_scenes;
-use crate::baked::{bake_arguments, bake_options, bake_world, nothing_to_bake_in};
+use crate::baked::{bake_arguments, bake_options, bake_world, few_bakes, nothing_to_bake_in};
 use crate::findings::{cheapest_by_error, error_of, milliseconds, percent, rounded, rounds, times_of};
 use crate::frame::Frame;
 use crate::frames::draw_frames;
@@ -22,6 +22,7 @@ use crate::picture::Picture;
 use crate::rounds::{Repeated, milliseconds_since, repeated};
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;
+use crate::shared_bake::bake_once;
 use crate::traced::{ray_tree, traced};
 use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
@@ -227,22 +228,32 @@ fn steps(
     let bake = bake_options(conditions, scene, conditions.unless_quick(4_000.0, 700.0))?;
     let bake = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..bake };
     let probed = BakeOptions { probes: Probes::Automatic, ..bake };
+    let few = few_bakes(conditions, scene)?.filter(|_| is_lit_by_unbaked);
+    let has_few = few.is_some();
+    measured.study.notes.extend(few.map(|why| {
+        format!("{why} There is no frame with the bounces of lamps that the file does not bake.")
+    }));
     let bakes = [
         (is_bakeable, "and lightmaps", bake, false),
         (is_bakeable && moves, "and probes", probed, false),
-        (is_lit_by_unbaked, "and bounces of every lamp", probed, true),
+        (is_lit_by_unbaked && !has_few, "and bounces of every lamp", probed, true),
     ];
     let bakes: Vec<_> = bakes.into_iter().filter(|(differs, ..)| *differs).collect();
     let part = |share: f64| before + share * (after - before);
     let count = bakes.len() as f64;
     let mut most_light = None;
     for (number, (_, label, options, of_every_lamp)) in (0..).zip(bakes) {
-        let mut world = scene.open(conditions.aspect())?;
-        if of_every_lamp {
-            bake_every_lamp(&mut world);
-        }
         let told = [part(f64::from(number) / count), part(f64::from(number + 1) / count)];
-        let (baked, _) = bake_world(conditions, world, &options, None, told)?;
+        let baked = match options.probes {
+            Probes::Never => bake_once(conditions, scene, &options, told)?,
+            _ => {
+                let mut world = scene.open(conditions.aspect())?;
+                if of_every_lamp {
+                    bake_every_lamp(&mut world);
+                }
+                bake_world(conditions, world, &options, None, told)?.0
+            }
+        };
         let draw = conditions.drawing("baked.glb", " --msaa");
         let command = match options.probes {
             // Files hold probes in fewer bits, and the command line has no option that changes lamps.

@@ -1,84 +1,45 @@
-//! Study of the density and the format of lightmaps: their sizes and times against what a frame loses.
+//! Study of the density of lightmaps and of their format on the device: their sizes and times against what a frame
+//! loses.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy_ecs::prelude::*;
-use lumbre_bake::{BakeOptions, Density};
-use lumbre_render::FrameOptions;
-use lumbre_scene::{
-    Lightmap, LightmapEncoding, LightmapImage, Mesh, PackedFormat, Supercompression, lightmap_to_ktx2,
-    lightmap_to_open_exr,
-};
+use lumbre_bake::{BakeOptions, BakeReport, Density};
+use lumbre_render::{FrameOptions, LightmapMemory};
+use lumbre_scene::{FrameSettings, Lightmap, LightmapEncoding, SceneSettings, reduce_lightmaps};
+use lumbre_trace::relative_error;
 
-use super::bake::{ERROR, QUICK_ERROR};
+use super::bake::{ERROR, QUICK_ERROR, reference_seconds};
 use super::over_scenes;
-use crate::baked::{Baked, bake_arguments, bake_options, bake_scene, nothing_to_bake};
-use crate::findings::{listed, percent, rounded, short};
+use crate::baked::{bake_arguments, bake_options, few_bakes, nothing_to_bake};
+use crate::converged_bake::{converged, converged_bake};
+use crate::findings::{counted, factor, listed, percent, ratio_of, rounded, short, times_of};
 use crate::frame::Frame;
-use crate::frames::draw_frames;
-use crate::fronts::pareto_front;
+use crate::frames::{DrawnFrame, draw_frames};
+use crate::fronts::front_of;
 use crate::measured::Measured;
+use crate::picture::Picture;
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;
-use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
+use crate::shared_bake::bake_once;
+use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Study};
 
 /// Approximate number of texels of the reference; each lower density has a quarter of the texels of the one
 /// before.
 const TEXELS: f64 = 20_000.0;
 const FEW_TEXELS: f64 = 4_000.0;
+/// The same where each bake takes seconds, as in other studies, so that they share the bake.
+const FEWEST_TEXELS: f64 = 700.0;
 /// Reductions of the density relative to the densest.
 const PARTS: &[f64] = &[1.0, 2.0, 4.0, 8.0];
 const FEW_PARTS: &[f64] = &[1.0, 2.0, 4.0];
 const DENSITY: &str = "texels along a metre";
-const BYTES: &str = "bytes of textures in that format";
+const BYTES: &str = "bytes of lightmaps";
 const BAKE: &str = "baked before, ms";
+/// The error that is due to the format alone.
+const OF_FORMAT: &str = "error against rgb32f at the same density, %";
 const SECONDS: f64 = 5.0;
-
-/// The format of texels on the GPU and in a file.
-#[derive(Clone, Copy)]
-enum Format {
-    Halves,
-    Packed(PackedFormat),
-}
-
-impl Format {
-    const ALL: [Self; 3] =
-        [Self::Halves, Self::Packed(PackedFormat::Rgb9E5), Self::Packed(PackedFormat::B10G11R11)];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Halves => "half floats",
-            Self::Packed(PackedFormat::Rgb9E5) => "RGB9E5",
-            Self::Packed(PackedFormat::B10G11R11) => "B10G11R11",
-        }
-    }
-
-    /// Returns the bytes of a texel on the GPU.
-    fn bytes(self) -> f64 {
-        match self {
-            Self::Halves => 8.0,
-            Self::Packed(_) => 4.0,
-        }
-    }
-
-    /// Returns a map after it was encoded and decoded, and the size of its file in bytes. Frames store all
-    /// maps as half floats, which represent every value of the packed formats.
-    fn kept(self, map: &LightmapImage) -> Result<(LightmapImage, usize), CostError> {
-        Ok(match self {
-            Self::Halves => {
-                let encoding = LightmapEncoding::Rgb16Float;
-                (LightmapImage { encoding, ..map.clone() }, lightmap_to_open_exr(map, encoding)?.0.len())
-            }
-            Self::Packed(format) => {
-                let file = lightmap_to_ktx2(map, format, Supercompression::Zstandard)?.0;
-                let through =
-                    |texel: &glam::Vec3| format.encode(*texel).map_or(*texel, |bits| format.decode(bits));
-                let texels = map.texels.iter().map(through).collect();
-                (LightmapImage { texels, ..map.clone() }, file.len())
-            }
-        })
-    }
-}
 
 /// Runs the study.
 ///
@@ -91,32 +52,37 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
 }
 
 fn study() -> Study {
+    let plot = |title: &str, across: Quantity, up: Quantity| Plot {
+        title: title.into(),
+        across,
+        up,
+        joined: true,
+        front: true,
+        ..Plot::default()
+    };
+    let bytes = || Quantity::Count(BYTES.into());
     Study {
         name: "lightmaps".into(),
         title: "Density and format of lightmaps".into(),
-        question: "How do the density of lightmaps and the bytes per texel affect the error and the time of a frame?".into(),
-        reference: "the frame with the densest lightmaps, in half floats".into(),
-        notes: vec![
-            "Lightmaps are unpacked when they are uploaded. On the device every format becomes half floats, so that all formats should take the same time. Bytes are those of the format itself."
-                .into(),
+        question: "How do the density of lightmaps and their format on the device affect the error and the time of a frame?".into(),
+        reference: "the frame with the lightmaps of a converged bake of the highest density; the noise that this bake states is allowed for. What the format alone loses is the difference from the same lightmaps as 32-bit floats".into(),
+        plots: vec![
+            plot("Error over bytes", bytes(), Quantity::Error),
+            plot("What the format alone loses, over bytes", bytes(), Quantity::Figure(OF_FORMAT.into())),
+            plot("Error over time", Quantity::Milliseconds, Quantity::Error),
         ],
-        plots: vec![Plot {
-            title: "Error over bytes".into(),
-            across: Quantity::Count(BYTES.into()),
-            up: Quantity::Error,
-            joined: true,
-            front: true,
-            ..Plot::default()
-        }],
         ..Study::default()
     }
 }
 
 /// The maps of one density.
 struct Maps {
-    baked: Baked,
+    world: Arc<Mutex<World>>,
+    report: BakeReport,
     options: BakeOptions,
     density: f64,
+    /// How many texels of the bake became one along each side.
+    reduction: u32,
 }
 
 fn of_scene(
@@ -130,155 +96,151 @@ fn of_scene(
         return Ok(());
     }
     let part = |share: f64| before + share * (after - before);
-    let options = bake_options(conditions, scene, conditions.unless_quick(TEXELS, FEW_TEXELS))?;
+    let few = few_bakes(conditions, scene)?;
+    let has_few = few.is_some();
+    measured.study.notes.extend(few.map(|why| {
+        format!("{why} It bakes the highest density only, with fewer texels; lower densities are means of its texels.")
+    }));
+    let texels = if has_few { FEWEST_TEXELS } else { conditions.unless_quick(TEXELS, FEW_TEXELS) };
+    let options = bake_options(conditions, scene, texels)?;
     let Density::TexelsPerMeter(densest) = options.density else { return Ok(()) };
-    let mut all = Vec::new();
-    let parts = conditions.unless_quick(PARTS, FEW_PARTS);
     let error = conditions.unless_quick(ERROR, QUICK_ERROR);
+    let parts = conditions.unless_quick(PARTS, FEW_PARTS);
+    let options_of_densest = options;
+    let mut all = Vec::new();
     for (place, halved) in parts.iter().enumerate() {
         let density = densest / halved;
         let options = BakeOptions { density: Density::TexelsPerMeter(density), error, ..options };
-        let told = [place, place + 1].map(|place| part(0.6 * place as f64 / parts.len() as f64));
-        all.push(Maps { baked: bake_scene(conditions, scene, &options, told)?, options, density });
+        let told = [place, place + 1].map(|place| part(0.3 * place as f64 / parts.len() as f64));
+        let mut baked = match has_few {
+            true => bake_once(conditions, scene, &BakeOptions { error, ..options_of_densest }, told)?,
+            false => bake_once(conditions, scene, &options, told)?,
+        };
+        let reduction = if has_few { *halved as u32 } else { 1 };
+        reduce_lightmaps(&mut baked.world, reduction);
+        let (world, report) = (Arc::new(Mutex::new(baked.world)), baked.report);
+        all.push(Maps { world, report, options, density, reduction });
     }
-    let mut frames = Vec::new();
-    let mut points = Vec::new();
-    for (place, maps) in all.iter_mut().enumerate() {
-        for format in Format::ALL {
-            // Formats make the same difference at every density, so only the two highest densities are
-            // measured in all formats, or only the highest.
-            if place > conditions.unless_quick(1, 0) && !matches!(format, Format::Halves) {
-                continue;
-            }
-            let (world, sizes) = in_format(conditions, scene, &mut maps.baked.world, format)?;
-            frames.push(Frame::new(world, FrameOptions::default()).sharing("lightmaps"));
-            points.push(point(conditions, scene, maps, format, sizes));
+    let time = conditions.reference_time(8.0, reference_seconds(has_few));
+    let options_of_truth = converged(conditions, &BakeOptions { error, ..options }, time);
+    let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.3), part(0.6)])?;
+    let noise = truth.report.error_of_mean;
+    measured.study.notes.push(format!(
+        "The converged bake of the {} states an error of {} of its mean.",
+        scene.name,
+        percent(noise)
+    ));
+    let (mut frames, mut points) = (Vec::new(), Vec::new());
+    for maps in &all {
+        for &format in LightmapEncoding::ALL {
+            let (settings, memory) = in_format(maps, format);
+            let frame = Frame::of(&maps.world, FrameOptions::default()).with_settings(settings);
+            frames.push(frame.sharing("lightmaps"));
+            points.push(point(conditions, scene, maps, format, memory));
         }
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [part(0.6), part(1.0)])?;
-    let reference = measured.keep_reference(&format!("{} densest", scene.name), drawn[0].picture.clone());
+    let reference = measured.keep_reference(&format!("{} converged", scene.name), truth.picture.clone());
     let first = measured.study.points.len();
-    for (mut point, frame) in points.into_iter().zip(&drawn) {
+    for (number, (mut point, frame)) in points.into_iter().zip(&drawn).enumerate() {
+        let floats = &drawn[number - number % LightmapEncoding::ALL.len()].picture;
+        point.figures.insert(OF_FORMAT.to_owned(), 100.0 * apart(floats, &frame.picture));
         point.milliseconds = frame.spread();
         point.counts.extend(frame.counts());
+        let uncertainty = explained_by(noise, apart(&truth.picture, &frame.picture));
+        point.error = Some(ErrorOf { uncertainty, ..ErrorOf::default() });
         measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
     }
-    let finding = finding(&scene.name, &measured.study.points[first..]);
-    measured.study.findings.extend(finding);
+    let findings = findings(&scene.name, &measured.study.points[first..], &drawn);
+    measured.study.findings.extend(findings);
     Ok(())
 }
 
-/// Bytes of the textures on the GPU, bytes of their files, and number of texels.
-struct Sizes {
-    textures: f64,
-    files: f64,
-    texels: f64,
+/// Returns the relative RMSE of a picture.
+fn apart(reference: &Picture, picture: &Picture) -> f64 {
+    relative_error(&reference.radiance, &picture.radiance)
 }
 
-/// Creates the scene with the maps of a bake after they were encoded in a format and decoded.
-fn in_format(
+/// Returns how much of an error the reference's own noise, which is independent of it, may account for.
+fn explained_by(noise: f64, error: f64) -> f64 {
+    error - (error.powi(2) - noise.powi(2)).max(0.0).sqrt()
+}
+
+/// Returns the settings of a scene with its lightmaps in this format, and their memory.
+fn in_format(maps: &Maps, lightmap_format: LightmapEncoding) -> (SceneSettings, LightmapMemory) {
+    // A thread that panicked was only drawing; the World is intact.
+    let mut world = maps.world.lock().unwrap_or_else(PoisonError::into_inner);
+    let own = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+    let settings = SceneSettings { frame: FrameSettings { lightmap_format, ..own.frame }, ..own };
+    let mut lit = world.query::<&Lightmap>();
+    let images: BTreeMap<_, _> =
+        lit.iter(&world).map(|map| (Arc::as_ptr(&map.image), [map.image.width, map.image.height])).collect();
+    (settings, LightmapMemory::of(lightmap_format, images.into_values()))
+}
+
+fn point(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
-    baked: &mut World,
-    format: Format,
-) -> Result<(World, Sizes), CostError> {
-    let mut kept: Vec<(Arc<LightmapImage>, Arc<LightmapImage>)> = Vec::new();
-    let mut sizes = Sizes { textures: 0.0, files: 0.0, texels: 0.0 };
-    let mut maps = baked.query::<&Lightmap>();
-    for map in maps.iter(baked) {
-        if kept.iter().any(|(known, _)| Arc::ptr_eq(known, &map.image)) {
-            continue;
-        }
-        let (image, file) = format.kept(&map.image)?;
-        sizes.files += file as f64;
-        sizes.texels += image.texels.len() as f64;
-        sizes.textures += format.bytes() * image.texels.len() as f64;
-        kept.push((Arc::clone(&map.image), Arc::new(image)));
-    }
-    // The scene is read again and has the same entities. They get the results of the bake, with other maps.
-    let mut world = scene.open(conditions.aspect())?;
-    let mut lit = baked.query::<(Entity, &Mesh, &Lightmap)>();
-    for (entity, mesh, map) in lit.iter(baked) {
-        let Some((_, image)) = kept.iter().find(|(known, _)| Arc::ptr_eq(known, &map.image)) else {
-            continue;
-        };
-        if let Ok(mut entity) = world.get_entity_mut(entity) {
-            entity.insert((mesh.clone(), Lightmap { image: Arc::clone(image) }));
-        }
-    }
-    Ok((world, sizes))
-}
-
-fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Format, sizes: Sizes) -> Point {
-    let counts = [(BYTES, sizes.textures), ("bytes of the files", sizes.files), ("texels", sizes.texels)];
-    let series = scene.series(conditions, format.name());
-    // Frames read the half floats that are stored beside a packed file.
-    let command = match format {
-        Format::Halves => format!(
-            "lumbre bake {} -o baked.glb {} --exr half && {}",
-            scene.in_commands(),
-            bake_arguments(&maps.options),
-            conditions.drawing("baked.glb", "")
-        ),
-        Format::Packed(_) => conditions.again("lightmaps"),
+    maps: &Maps,
+    format: LightmapEncoding,
+    memory: LightmapMemory,
+) -> Point {
+    let counts = [(BYTES, memory.bytes as f64), ("texels", memory.texels as f64)];
+    let density = Density::TexelsPerMeter(maps.density * f64::from(maps.reduction));
+    let baked_with = BakeOptions { density, ..maps.options };
+    let reduced = match maps.reduction {
+        1 => String::new(),
+        reduction => format!(" --lightmap-reduction {reduction}"),
     };
     Point {
-        series,
+        series: scene.series(conditions, format.name()),
         label: format!("{} a metre", short(maps.density)),
         parameters: [(DENSITY.to_owned(), maps.density)].into(),
         counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
-        figures: [(BAKE.to_owned(), 1e3 * maps.baked.report.seconds)].into(),
-        command,
+        figures: [(BAKE.to_owned(), 1e3 * maps.report.seconds)].into(),
+        command: format!(
+            "lumbre bake {} -o baked.glb {} && {}",
+            scene.in_commands(),
+            bake_arguments(&baked_with),
+            conditions.drawing("baked.glb", &format!(" --lightmap-format {}{reduced}", format.name()))
+        ),
         ..Point::default()
     }
 }
 
-/// Reports what formats and densities lose, and whether their times differ.
-fn finding(scene: &str, points: &[Point]) -> Vec<String> {
-    let [reference, others @ ..] = points else { return Vec::new() };
-    let errors = |points: &[&Point]| {
-        points.iter().filter_map(|p| p.error).map(|e| e.relative_rmse).fold(0.0, f64::max)
+/// Reports what formats and densities lose, and whether their times differ. `points` are all formats of the highest
+/// density, then of the next one.
+fn findings(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Vec<String> {
+    let count = LightmapEncoding::ALL.len();
+    let (Some(densest), Some(halved)) = (points.get(..count), points.get(count..2 * count)) else {
+        return Vec::new();
     };
-    let same_density: Vec<&Point> = others.iter().filter(|point| point.label == reference.label).collect();
-    let coarser: Vec<&Point> = others.iter().filter(|point| point.label != reference.label).collect();
+    let lost = |point: &Point| point.figures.get(OF_FORMAT).copied();
+    let error = |point: &Point| point.error.map(|error| error.relative_rmse);
     let mut findings = Vec::new();
-    if let Some(next) =
-        coarser.iter().filter_map(|point| point.error).map(|e| e.relative_rmse).min_by(f64::total_cmp)
-    {
-        let formats: Vec<String> = same_density
-            .iter()
-            .filter_map(|point| {
-                Some(format!("{} loses {}", point.series, percent(point.error?.relative_rmse)))
-            })
-            .collect();
-        let formats: Vec<&str> = formats.iter().map(String::as_str).collect();
-        let less = if errors(&same_density) < next { "less than" } else { "not less than" };
-        findings.push(format!(
-            "In the {scene}, {}: {less} half the density, which loses {}.",
-            listed(&formats, "and"),
-            percent(next)
-        ));
-    }
-    // The front is one of bytes and errors, so the bytes replace the times.
-    let by_bytes: Vec<Point> = points
+    let formats: Vec<String> = densest
         .iter()
-        .filter_map(|point| {
-            let bytes = *point.counts.get(BYTES)?;
-            let milliseconds = Spread::of(&[bytes]);
-            Some(Point { milliseconds, ..point.clone() })
+        .zip(LightmapEncoding::ALL)
+        .skip(1)
+        .filter_map(|(point, format)| {
+            Some(format!("{} loses {}", format.name(), percent(lost(point)? / 100.0)))
         })
         .collect();
-    let front: Vec<String> = pareto_front(&by_bytes)
+    let formats: Vec<&str> = formats.iter().map(String::as_str).collect();
+    if let (Some(full), Some(half)) = (error(&densest[0]), error(&halved[0])) {
+        findings.push(format!(
+            "In the {scene}, {} of the light, compared with rgb32f at the same density; half the density has an error of {} instead of {}.",
+            listed(&formats, "and"),
+            percent(half),
+            percent(full)
+        ));
+    }
+    let front: Vec<String> = front_of(points, |point| Some((*point.counts.get(BYTES)?, error(point)?)))
         .iter()
         .filter_map(|point| {
-            let bytes = point.milliseconds?.median;
-            Some(format!(
-                "{} at {} ({} MB, {})",
-                point.series,
-                point.label,
-                rounded(bytes / 1e6),
-                percent(point.error?.relative_rmse)
-            ))
+            let megabytes = rounded(point.counts.get(BYTES)? / 1e6);
+            let error = percent(error(point)?);
+            Some(format!("{} at {} ({megabytes} MB, {error})", point.series, point.label))
         })
         .collect();
     let front: Vec<&str> = front.iter().map(String::as_str).collect();
@@ -286,13 +248,32 @@ fn finding(scene: &str, points: &[Point]) -> Vec<String> {
         "The lightmaps of the {scene} with the fewest bytes for their error: {}.",
         listed(&front, "and")
     ));
-    let told_apart = others.iter().any(|point| match (point.milliseconds, reference.milliseconds) {
-        (Some(time), Some(whole)) => time.is_below(&whole) || whole.is_below(&time),
-        _ => false,
-    });
-    if !told_apart {
-        findings
-            .push(format!("The times of the {scene}'s frames with these lightmaps are not distinguishable."));
-    }
+    findings.extend(finding_of_times(scene, points, drawn));
     findings
+}
+
+/// Says how many times as long frames take in each format as in half floats, and with the fewest texels as with the
+/// most.
+fn finding_of_times(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Option<String> {
+    let of_format = |name: &str| -> Vec<f64> {
+        let own = points.iter().zip(drawn).filter(|(point, _)| point.series.starts_with(name));
+        own.flat_map(|(_, frame)| frame.times.iter().copied()).collect()
+    };
+    let halves = LightmapEncoding::Rgb16Float.name();
+    let others = LightmapEncoding::ALL.iter().map(|format| format.name()).filter(|name| *name != halves);
+    let ratio = |name: &str| ratio_of(&of_format(name), &of_format(halves));
+    let ratios: Vec<String> =
+        others.filter_map(|name| Some(format!("with {name} {}", factor(&ratio(name)?)))).collect();
+    let ratios: Vec<&str> = ratios.iter().map(String::as_str).collect();
+    let texels = |point: &Point| point.counts.get("texels").copied().unwrap_or_default();
+    let of_halves = || points.iter().filter(|point| point.series.starts_with(halves));
+    let most = of_halves().max_by(|a, b| texels(a).total_cmp(&texels(b)))?;
+    let fewest = of_halves().min_by(|a, b| texels(a).total_cmp(&texels(b)))?;
+    Some(format!(
+        "A frame of the {scene} takes this many times as long as with {halves}: {}. With {} texels instead of {} it takes {}.",
+        listed(&ratios, "and"),
+        counted(texels(fewest)),
+        counted(texels(most)),
+        times_of(&fewest.milliseconds?, &most.milliseconds?)
+    ))
 }

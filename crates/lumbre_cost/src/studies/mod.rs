@@ -70,7 +70,7 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind {
         name: "preprocessing",
         about: "interreflected light, baked before the game",
-        method: 2,
+        method: 3,
         run: preprocessing::run,
     },
     StudyKind {
@@ -91,7 +91,7 @@ pub const STUDIES: &[StudyKind] = &[
         method: 3,
         run: reflection::run,
     },
-    StudyKind { name: "lightmaps", about: "density and format of lightmaps", method: 2, run: lightmaps::run },
+    StudyKind { name: "lightmaps", about: "density and format of lightmaps", method: 3, run: lightmaps::run },
     StudyKind {
         name: "precision",
         about: "f32 on the device, compared with f64",
@@ -101,7 +101,7 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind {
         name: "documents",
         about: "what the documents say about cost, where no other study measures it",
-        method: 1,
+        method: 2,
         run: documents::run,
     },
 ];

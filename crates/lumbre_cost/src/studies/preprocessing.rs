@@ -4,7 +4,7 @@
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_bake::BakeOptions;
+use lumbre_bake::{BakeOptions, Samples};
 use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
 use lumbre_scene::{
@@ -12,13 +12,15 @@ use lumbre_scene::{
     hidden_entities,
 };
 
-use super::bake::{ERROR, QUICK_ERROR, REFERENCE_SECONDS};
+use super::bake::{ERROR, QUICK_ERROR, reference_seconds};
 use super::over_scenes;
 use crate::baked::{
-    Baked, bake_arguments, bake_options, bake_world, maps_of, nothing_to_bake, picture_of_maps, texel_error,
+    Baked, bake_arguments, bake_direct_light, bake_options, bake_world, few_bakes, maps_of, nothing_to_bake,
+    picture_of_maps, texel_error,
 };
+use crate::bounce_by_bounce::{BounceByBounce, not_followed};
 use crate::converged_bake::{converged, converged_bake};
-use crate::findings::{error_of, factor, milliseconds, ratio_of, rounded, times_of};
+use crate::findings::{error_of, factor, listed, milliseconds, percent, ratio_of, rounded, times_of};
 use crate::frame::Frame;
 use crate::frames::{DrawnFrame, draw_frames, draw_picture};
 use crate::measured::Measured;
@@ -34,6 +36,13 @@ const STEP: f64 = 0.1;
 const FRAME: &str = "frame";
 const BAKE: &str = "bake after a change";
 const BEFORE: &str = "baked before, ms";
+const BOUNCES: &str = "bounces in the lightmaps";
+/// How many bounces lightmaps have, one after the other.
+const COUNTS: &[u32] = &[0, 1, 2, 3, 4, 8];
+const FEW_COUNTS: &[u32] = &[0, 1, 2];
+/// Rays from a texel by which light bounces.
+const RAYS: usize = 256;
+const FEW_RAYS: usize = 64;
 
 /// Runs the study.
 ///
@@ -59,13 +68,17 @@ fn study(conditions: &Conditions<'_>) -> Study {
         true => vec![plot("Error over time", &[])],
         false => vec![
             plot("Frames: error over time", &[FRAME]),
+            Plot {
+                across: Quantity::Figure(BEFORE.into()),
+                ..plot("Bounces in the lightmaps: error over the time of the bake", &[FRAME])
+            },
             plot("Bakes after a change: error over time", &[BAKE]),
         ],
     };
     Study {
         name: "preprocessing".into(),
         title: "Interreflected light, baked before the game".into(),
-        question: "Interreflected light is baked once and read in every frame. What does it cost a frame, how long does the bake take, and how long does it take again when something has moved?".into(),
+        question: "Interreflected light is baked once and read in every frame. What does it cost a frame, how long does the bake take, what does each bounce take and bring, and how long does it take again when something has moved?".into(),
         reference: "for frames, the frame with the lightmaps of a converged bake; for bakes after a change, a converged bake of the changed level, whose own noise is subtracted".into(),
         plots,
         ..Study::default()
@@ -83,28 +96,47 @@ fn of_scene(
         return Ok(());
     }
     let part = |share: f64| before + share * (after - before);
+    let few = few_bakes(conditions, scene)?;
+    let has_few = few.is_some();
+    measured.study.notes.extend(few.map(|why| {
+        format!(
+            "{why} After a change it bakes once, for an error of {} instead of {}.",
+            percent(QUICK_ERROR),
+            percent(ERROR)
+        )
+    }));
     let options = options_of(conditions, scene, 1.0)?;
     let options = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..options };
     // The converged bake does not depend on the requested error.
-    let options_of_truth = converged(conditions, &options, conditions.reference_time(8.0, REFERENCE_SECONDS));
-    let (baked, _) =
+    let time = conditions.reference_time(8.0, reference_seconds(has_few));
+    let options_of_truth = converged(conditions, &options, time);
+    let (mut baked, samples) =
         bake_world(conditions, scene.open(conditions.aspect())?, &options, None, [part(0.0), part(0.1)])?;
+    conditions.bakes.keep(scene, &options, &mut baked);
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.1), part(0.3)])?;
     let truth = truth.picture.clone();
     let first = measured.study.points.len();
-    let drawn = frames(conditions, scene, baked, &options, truth, [part(0.3), part(0.5)], measured)?;
-    let findings = findings_of_frames(&scene.name, &measured.study.points[first..], &drawn);
+    let bounced = by_bounces(conditions, scene, &options, [part(0.3), part(0.35)], measured)?;
+    let shares = bounced.iter().map(|bounced| bounced.share).collect::<Vec<_>>();
+    let drawn =
+        frames(conditions, scene, (baked, bounced), &options, truth, [part(0.35), part(0.5)], measured)?;
+    let points = &measured.study.points[first..];
+    let mut findings = findings_of_frames(&scene.name, points, &drawn);
+    findings.extend(finding_of_bounces(&scene.name, points, &drawn, &shares));
     measured.study.findings.extend(findings);
     match conditions.files.is_empty() {
         true => {
             // In a single room hardly any light stays the same, whatever moves.
             let rooms = SceneFile::made(conditions, "two-rooms", two_rooms())?;
             let options = options_of(conditions, &rooms, 2.0)?;
-            after_a_change(conditions, &rooms, &options, [part(0.5), part(1.0)], measured)
+            after_a_change(conditions, &rooms, &options, None, [part(0.5), part(1.0)], measured)
+        }
+        false if has_few => {
+            after_a_change(conditions, scene, &options, Some(samples), [part(0.5), part(1.0)], measured)
         }
         false => {
             let options = options_of(conditions, scene, 1.0)?;
-            after_a_change(conditions, scene, &options, [part(0.5), part(1.0)], measured)
+            after_a_change(conditions, scene, &options, None, [part(0.5), part(1.0)], measured)
         }
     }
 }
@@ -116,11 +148,13 @@ fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Res
     Ok(BakeOptions { error: ERROR, ..bake_options(conditions, scene, texels)? })
 }
 
-/// Moves an object of a scene, and bakes the scene from scratch and by reusing a former bake.
+/// Moves an object of a scene, and bakes the scene from scratch and by reusing a former bake. Where each bake takes
+/// seconds, `known` are the samples of a former bake with these options, if it left any, and each bake is made once.
 fn after_a_change(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
     options: &BakeOptions,
+    known: Option<Option<Samples>>,
     [before, after]: [f64; 2],
     measured: &mut Measured,
 ) -> Result<(), CostError> {
@@ -131,7 +165,11 @@ fn after_a_change(
         measured.study.notes.push(note);
         return Ok(());
     };
-    let (_, samples) = bake_world(conditions, open()?, options, None, [part(0.0), part(0.1)])?;
+    let has_few = known.is_some();
+    let samples = match known {
+        Some(samples) => samples,
+        None => bake_world(conditions, open()?, options, None, [part(0.0), part(0.1)])?.1,
+    };
     let Some(samples) = samples else {
         measured
             .study
@@ -145,7 +183,7 @@ fn after_a_change(
         Ok(world)
     };
     let first = measured.study.points.len();
-    let time = conditions.reference_time(8.0, REFERENCE_SECONDS);
+    let time = conditions.reference_time(8.0, reference_seconds(has_few));
     let options_of_truth = converged(conditions, options, time);
     let (mut truth, _) = bake_world(conditions, changed()?, &options_of_truth, None, [part(0.1), part(0.4)])?;
     let drawn = draw_picture(conditions, &mut truth.world, &FrameOptions::default())?;
@@ -154,7 +192,8 @@ fn after_a_change(
     let reference_maps =
         measured.keep_reference(&format!("{} changed, converged maps", scene.name), picture_of_maps(&truth));
     let formers = [None, Some(&samples)];
-    let done = repeated(formers.len(), conditions.repetitions(), |place, [from, to]| {
+    let repetitions = if has_few { 1 } else { conditions.repetitions() };
+    let done = repeated(formers.len(), repetitions, |place, [from, to]| {
         let told = [from, to].map(|share| part(0.4 + 0.6 * share));
         let (baked, _) = bake_world(conditions, changed()?, options, formers[place], told)?;
         Ok((1e3 * baked.report.seconds, baked))
@@ -188,12 +227,59 @@ fn after_a_change(
     Ok(())
 }
 
-/// Measures three frames: with lamps only, with the constant ambient light that comes closest to the
-/// reference, and with lightmaps.
+/// A scene whose lightmaps have the direct light and some bounces.
+struct Bounced {
+    world: World,
+    bounces: u32,
+    /// Milliseconds until they had them.
+    before: f64,
+    /// The light of the last bounce as a share of all light so far.
+    share: f64,
+}
+
+/// Bakes direct light, and adds bounces one by one. Nothing if the scene's bounces cannot be followed so.
+fn by_bounces(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    options: &BakeOptions,
+    told: [f64; 2],
+    measured: &mut Measured,
+) -> Result<Vec<Bounced>, CostError> {
+    let Baked { world: mut direct, report } = bake_direct_light(conditions, scene, options, told)?;
+    if let Some(why) = not_followed(&mut direct) {
+        measured.study.notes.push(format!("There are no single bounces of {}: {why}.", scene.name));
+        return Ok(Vec::new());
+    }
+    let mut light = BounceByBounce::new(&mut direct, conditions.unless_quick(RAYS, FEW_RAYS));
+    measured.study.notes.push(format!(
+        "Single bounces: the baker leaves out all of them, and then {} rays from each of the {} texels that show a surface gather one bounce after the other; textures reflect by their mean. With lightmaps without a number of bounces, the baker has solved for all of them.",
+        conditions.unless_quick(RAYS, FEW_RAYS),
+        light.texels()
+    ));
+    let mut before = 1e3 * report.seconds;
+    let (mut bounces, mut bounced) = (0, Vec::new());
+    for &count in conditions.unless_quick(COUNTS, FEW_COUNTS) {
+        if bounces == 0 && count > 0 {
+            before += light.cast_ms;
+        }
+        while bounces < count {
+            before += light.bounce();
+            bounces += 1;
+        }
+        let mut world = scene.open(conditions.aspect())?;
+        light.show(&mut direct, &mut world);
+        let share = if count > 0 { light.share_of_last() } else { 1.0 };
+        bounced.push(Bounced { world, bounces, before, share });
+    }
+    Ok(bounced)
+}
+
+/// Measures frames: with lamps only, with the constant ambient light that comes closest to the reference, with
+/// lightmaps, and with lightmaps that have some bounces only.
 fn frames(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
-    baked: Baked,
+    (baked, bounced): (Baked, Vec<Bounced>),
     options: &BakeOptions,
     truth: Picture,
     told: [f64; 2],
@@ -209,9 +295,11 @@ fn frames(
     let under_one = draw_picture(conditions, &mut with_ambient(Vec3::ONE)?, &draw)?;
     let ambient = best_ambient(&alone, &under_one, &truth);
     let bake_time = 1e3 * baked.report.seconds;
-    let frames = [with_ambient(Vec3::ZERO)?, with_ambient(ambient)?, baked.world];
-    let frames = frames.map(|world| Frame::new(world, draw.clone()).sharing("preprocessing"));
-    let drawn = draw_frames(conditions, frames.into(), SECONDS, told)?;
+    let of_bounces: Vec<(u32, f64)> = bounced.iter().map(|one| (one.bounces, one.before)).collect();
+    let worlds = [with_ambient(Vec3::ZERO)?, with_ambient(ambient)?, baked.world];
+    let worlds = worlds.into_iter().chain(bounced.into_iter().map(|one| one.world));
+    let frames = worlds.map(|world| Frame::new(world, draw.clone()).sharing("preprocessing")).collect();
+    let drawn = draw_frames(conditions, frames, SECONDS, told)?;
     let reference = measured.keep_reference(&format!("{} converged", scene.name), truth);
     let labels = ["by lamps alone", "with the best ambient light", "with lightmaps"];
     for (label, frame) in labels.into_iter().zip(&drawn) {
@@ -240,7 +328,25 @@ fn frames(
         }
         measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
     }
+    for ((bounces, before), frame) in of_bounces.into_iter().zip(&drawn[labels.len()..]) {
+        let point = Point {
+            series: scene.series(conditions, FRAME),
+            label: format!("with lightmaps of {}", counted_bounces(bounces)),
+            parameters: [(BOUNCES.to_owned(), f64::from(bounces))].into(),
+            milliseconds: frame.spread(),
+            counts: frame.counts(),
+            figures: [(BEFORE.to_owned(), before)].into(),
+            command: conditions.again("preprocessing"),
+            ..Point::default()
+        };
+        measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+    }
     Ok(drawn)
+}
+
+/// "1 bounce", "2 bounces".
+fn counted_bounces(count: u32) -> String {
+    format!("{count} {}", if count == 1 { "bounce" } else { "bounces" })
 }
 
 /// Returns the ambient light, per channel, with which the frame comes closest to the reference. Light is
@@ -282,14 +388,14 @@ fn moved(world: &mut World) -> Option<String> {
 }
 
 fn findings_of_frames(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Vec<String> {
-    let [alone, ambient, lightmaps] = points else { return Vec::new() };
+    let [alone, ambient, lightmaps, ..] = points else { return Vec::new() };
     let errors = [alone, ambient, lightmaps]
         .map(|point| point.error.map_or_else(String::new, |error| error_of(&error)));
     let mut findings = vec![format!(
         "Without interreflected light, the error of frames of the {scene} is {}; with the best constant ambient light it is {}, with lightmaps {}.",
         errors[0], errors[1], errors[2]
     )];
-    if let Some((alone, lit)) = drawn.first().zip(drawn.last())
+    if let Some((alone, lit)) = drawn.first().zip(drawn.get(2))
         && let Some(ratio) = ratio_of(&lit.times, &alone.times)
         && let (Some(time), Some(bake)) = (&lightmaps.milliseconds, lightmaps.figures.get(BEFORE))
     {
@@ -308,6 +414,41 @@ fn findings_of_frames(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Ve
         ));
     }
     findings
+}
+
+/// Says what each bounce leaves of the error, how long it took, and whether frames take longer with it. `shares` are
+/// the parts of all light so far that the last bounce of each point brings.
+fn finding_of_bounces(scene: &str, points: &[Point], drawn: &[DrawnFrame], shares: &[f64]) -> Option<String> {
+    let all = points.iter().position(|point| point.label == "with lightmaps")?;
+    let (own, frames) = (points.get(all + 1..)?, drawn.get(all + 1..)?);
+    let (none, most) = (own.first()?, own.last()?);
+    let before = |point: &Point| point.figures.get(BEFORE).map(|before| format!("{} ms", rounded(*before)));
+    let told: Vec<String> = own
+        .iter()
+        .zip(shares)
+        .filter_map(|(point, share)| {
+            let bounces = *point.parameters.get(BOUNCES)? as u32;
+            let brings = match bounces {
+                0 => String::new(),
+                _ => format!(", the last of which is {} of the light", percent(*share)),
+            };
+            let error = error_of(&point.error?);
+            Some(format!("{} {error} (baked in {}{brings})", counted_bounces(bounces), before(point)?))
+        })
+        .collect();
+    let told: Vec<&str> = told.iter().map(String::as_str).collect();
+    let ratio = ratio_of(&frames.last()?.times, &frames.first()?.times)?;
+    Some(format!(
+        "Errors of the {scene}'s frames by the number of bounces in the lightmaps: {}; with all of them {} (baked in {}). A frame with {} takes {} times as long as with {}: {}, and {}.",
+        listed(&told, "and"),
+        error_of(&points[all].error?),
+        before(&points[all])?,
+        counted_bounces(*most.parameters.get(BOUNCES)? as u32),
+        factor(&ratio),
+        counted_bounces(*none.parameters.get(BOUNCES)? as u32),
+        milliseconds(&most.milliseconds?),
+        milliseconds(&none.milliseconds?)
+    ))
 }
 
 fn finding_of_change(scene: &str, moved: &str, points: &[Point]) -> Option<String> {

@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::*;
 use lumbre_optics::{ErrorBound, Light, LightKind, Shading};
 use lumbre_render::FrameOptions;
-use lumbre_scene::{Camera, FrameSettings, SceneSettings, ShadowFilter};
+use lumbre_scene::{Camera, FrameSettings, LightmapEncoding, SceneSettings, ShadowFilter};
 
 use crate::findings::short;
 
@@ -24,6 +24,8 @@ pub struct DrawSettings {
     pub multisample: bool,
     /// How many texels of a lightmap become one along each side; 1 for lightmaps as they are in the file.
     pub lightmap_reduction: u32,
+    /// Format of lightmaps on the device.
+    pub lightmap_format: LightmapEncoding,
 }
 
 /// What a level leaves to choose.
@@ -60,7 +62,8 @@ const SHADOWS: [(ShadowFilter, f32); 6] = [
 const THRESHOLDS: [f32; 3] = [0.002, 0.01, 0.05];
 
 impl DrawSettings {
-    /// The most accurate settings for a level with shadows.
+    /// The most accurate settings for a level with shadows. Lightmaps are half floats: 32-bit ones take twice the
+    /// memory for a fiftieth of a percent.
     const MOST_ACCURATE: Self = Self {
         shading: Shading::Phong,
         shadows: true,
@@ -69,6 +72,7 @@ impl DrawSettings {
         light_threshold: 0.0,
         multisample: true,
         lightmap_reduction: 1,
+        lightmap_format: LightmapEncoding::Rgb16Float,
     };
 
     /// Returns the settings with which a World is drawn with these options, for objects that do not choose
@@ -83,6 +87,7 @@ impl DrawSettings {
             light_threshold: settings.frame.light_threshold,
             multisample: options.multisample.or(settings.frame.multisample).unwrap_or(false),
             lightmap_reduction: 1,
+            lightmap_format: settings.frame.lightmap_format,
         }
     }
 
@@ -127,11 +132,19 @@ impl DrawSettings {
             threshold => format!(", lamps to {}", short(f64::from(threshold))),
         };
         let samples = if self.multisample { ", four samples" } else { "" };
-        let maps = match self.lightmap_reduction {
-            1 => String::new(),
-            reduction => format!(", lightmaps at 1/{reduction}"),
-        };
+        let has_other_maps = self.lightmap_reduction > 1 || self.lightmap_format != reference.lightmap_format;
+        let maps =
+            if has_other_maps { format!(", lightmaps {}", self.of_lightmaps()) } else { String::new() };
         format!("{}{shadows}{lamps}{samples}{maps}", self.shading)
+    }
+
+    /// Says how dense the lightmaps are, and in which format.
+    pub(crate) fn of_lightmaps(&self) -> String {
+        let format = self.lightmap_format.name();
+        match self.lightmap_reduction {
+            1 => format!("as {format}"),
+            reduction => format!("at 1/{reduction} as {format}"),
+        }
     }
 
     /// Returns the arguments of `lumbre render` for these settings.
@@ -149,8 +162,12 @@ impl DrawSettings {
             1 => String::new(),
             reduction => format!(" --lightmap-reduction {reduction}"),
         };
+        let format = match self.lightmap_format {
+            usual if usual == FrameSettings::default().lightmap_format => String::new(),
+            format => format!(" --lightmap-format {}", format.name()),
+        };
         format!(
-            "--shading {}{shadows} --light-threshold {}{samples}{maps}",
+            "--shading {}{shadows} --light-threshold {}{samples}{maps}{format}",
             self.shading, self.light_threshold
         )
     }
@@ -163,6 +180,7 @@ impl DrawSettings {
             shadows: self.shadows,
             shadow_resolution: self.shadow_resolution,
             shadow_filter: self.shadow_filter,
+            lightmap_format: self.lightmap_format,
         }
     }
 

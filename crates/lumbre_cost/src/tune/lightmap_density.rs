@@ -1,12 +1,13 @@
-//! The density of lightmaps among the settings of a level: the chosen settings are measured with coarser maps
-//! too. The time of a frame hardly depends on the number of texels, so that what is saved are bytes: of the maps
-//! that keep the goal, those with the fewest are chosen.
+//! The density and the format of lightmaps among the settings of a level: the chosen settings are measured with
+//! coarser and with packed maps too. The time of a frame hardly depends on them, so that what is saved are bytes:
+//! of the maps that keep the goal, those with the fewest are chosen.
 
 use std::collections::HashSet;
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use lumbre_scene::Lightmap;
+use lumbre_render::LightmapMemory;
+use lumbre_scene::{Lightmap, LightmapEncoding};
 
 use super::candidates::Candidates;
 use super::draw_settings::DrawSettings;
@@ -20,8 +21,8 @@ pub const LIGHTMAP_BYTES: &str = "bytes of lightmaps";
 /// How many texels become one along each side, the densest first.
 const REDUCTIONS: [u32; 4] = [1, 2, 4, 8];
 
-/// Bytes of a texel on the device: four half floats.
-const TEXEL: f64 = 8.0;
+/// Formats on the device, the most accurate first.
+const FORMATS: [LightmapEncoding; 2] = [LightmapEncoding::Rgb16Float, LightmapEncoding::Rgb9E5];
 
 /// The sizes of a level's lightmaps.
 pub(crate) struct LightmapSizes(Vec<[u32; 2]>);
@@ -40,16 +41,20 @@ impl LightmapSizes {
         self.0.is_empty()
     }
 
-    /// Returns their bytes on the device if this many texels become one along each side.
-    pub fn bytes(&self, reduction: u32) -> f64 {
-        let texels = |side: &[u32; 2]| side.map(|side| f64::from(side.div_ceil(reduction)));
-        self.0.iter().map(texels).map(|[width, height]| TEXEL * width * height).sum()
+    /// Returns their bytes on the device with these settings.
+    pub fn bytes(&self, way: &DrawSettings) -> f64 {
+        let reduced = |sides: &[u32; 2]| sides.map(|side| side.div_ceil(way.lightmap_reduction));
+        LightmapMemory::of(way.lightmap_format, self.0.iter().map(reduced)).bytes as f64
     }
 }
 
-/// Returns settings with lightmaps of each density, beginning with the settings themselves.
-pub(crate) fn variants(of: DrawSettings) -> [DrawSettings; REDUCTIONS.len()] {
-    REDUCTIONS.map(|lightmap_reduction| DrawSettings { lightmap_reduction, ..of })
+/// Returns settings with lightmaps of each density in each format, beginning with the settings themselves, whose
+/// lightmaps are those of the most accurate settings.
+pub(crate) fn variants(of: DrawSettings) -> Vec<DrawSettings> {
+    let in_formats = |lightmap_reduction| {
+        FORMATS.map(|lightmap_format| DrawSettings { lightmap_reduction, lightmap_format, ..of })
+    };
+    REDUCTIONS.into_iter().flat_map(in_formats).collect()
 }
 
 /// Returns the index of the lightmaps with the fewest bytes that do as well as the first, with which settings
@@ -93,39 +98,46 @@ pub(crate) fn front(
     front.into_iter().map(|(place, _)| *place).collect()
 }
 
-/// Says what coarser lightmaps save and lose, compared with the first of these points, and whether they change
-/// the time of a frame.
-pub(crate) fn findings(points: &[(&Point, f64)]) -> Vec<String> {
-    let Some(((first, bytes), others)) = points.split_first() else { return Vec::new() };
+/// Says what coarser and packed lightmaps save and lose, compared with the first of these points, and whether they
+/// change the time of a frame. `points` have their bytes beside them, `ways` are their settings.
+pub(crate) fn findings(points: &[(&Point, f64)], ways: &[DrawSettings]) -> Vec<String> {
+    let (Some(((first, bytes), others)), Some((of_first, ways))) = (points.split_first(), ways.split_first())
+    else {
+        return Vec::new();
+    };
     let (Some(time), Some(error)) = (first.milliseconds, first.error) else { return Vec::new() };
     let megabytes = |bytes: f64| rounded(bytes / 1e6);
     let known: Vec<_> = others
         .iter()
-        .filter_map(|(point, bytes)| Some((point, *bytes, point.milliseconds?, point.error?)))
+        .zip(ways)
+        .filter_map(|((point, bytes), way)| {
+            Some((way.of_lightmaps(), *bytes, point.milliseconds?, point.error?))
+        })
         .collect();
     let sizes: Vec<String> = known
         .iter()
-        .map(|(_, bytes, _, error)| format!("{} MB ({})", megabytes(*bytes), error_of(error)))
+        .map(|(maps, bytes, _, error)| format!("{maps} {} MB ({})", megabytes(*bytes), error_of(error)))
         .collect();
     let sizes: Vec<&str> = sizes.iter().map(String::as_str).collect();
     let mut findings = vec![format!(
-        "With {}, the lightmaps take {} MB on the device and the error is {}; coarser ones take {}.",
+        "With {}, the lightmaps take {} MB on the device ({}) and the error is {}; they would take {}.",
         first.label,
         megabytes(*bytes),
+        of_first.of_lightmaps(),
         error_of(&error),
         listed(&sizes, "and")
     )];
     let apart: Vec<String> = known
         .iter()
         .filter(|(_, _, own, _)| own.is_below(&time) || time.is_below(own))
-        .map(|(point, _, own, _)| format!("{} takes {}", point.label, times_of(own, &time)))
+        .map(|(maps, _, own, _)| format!("with lightmaps {maps} it takes {}", times_of(own, &time)))
         .collect();
     findings.push(match apart.is_empty() {
         true => format!(
-            "The time of a frame does not change measurably with the density of lightmaps ({} rounds), so that it is chosen by error and bytes alone.",
+            "The time of a frame does not change measurably with the density and the format of lightmaps ({} rounds), so that these are chosen by error and bytes alone.",
             time.rounds
         ),
-        false => format!("The time of a frame changes with the density of lightmaps: {}.", apart.join("; ")),
+        false => format!("The time of a frame changes with its lightmaps: {}.", apart.join("; ")),
     });
     findings
 }

@@ -33,6 +33,7 @@ use crate::machine::machine;
 use crate::measured::Measured;
 use crate::rounds::Rounds;
 use crate::scene_file::SceneFile;
+use crate::shared_bake::SharedBakes;
 use crate::{Conditions, CostError, CostReport, Listener, Plot, Point, Quantity, Settings, Spread, Study};
 
 /// The result of tuning.
@@ -82,12 +83,14 @@ pub fn tune(
     let begun = Instant::now();
     let files = [options.file.clone()];
     let (pictures, converged) = (RefCell::new(Renderer::new(gpu)), ConvergedBakes::default());
+    let bakes = SharedBakes::default();
     let ahead = device_ahead(gpu);
     let conditions = Conditions {
         gpu,
         ahead: ahead.as_ref(),
         pictures: &pictures,
         converged: &converged,
+        bakes: &bakes,
         quick: options.quick,
         counts_only: false,
         counts_lights: false,
@@ -131,7 +134,7 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     let mut chosen = search.choose(goal, [NARROWED_DOWN, CHOSEN])?;
     let mut front = search.found.front();
     let mut of_lightmaps = Vec::new();
-    let sizes = |way: &DrawSettings| lightmaps.bytes(way.lightmap_reduction);
+    let sizes = |way: &DrawSettings| lightmaps.bytes(way);
     // Without a goal, the errors of coarser lightmaps show best beside the most accurate settings.
     if let Some(of) = chosen.or(front.last().copied()).filter(|_| !lightmaps.is_empty()) {
         let variants = lightmap_density::variants(search.found.settings[of]);
@@ -144,7 +147,8 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
             places.iter().map(|&place| (&found.points[place], sizes(&found.settings[place]))).collect();
         chosen =
             chosen.map(|chosen| lightmap_density::choose(&points, goal).map_or(chosen, |one| places[one]));
-        of_lightmaps = lightmap_density::findings(&points);
+        let ways: Vec<DrawSettings> = places.iter().map(|&place| found.settings[place]).collect();
+        of_lightmaps = lightmap_density::findings(&points, &ways);
         front = lightmap_density::front(found, chosen, sizes);
     }
     let Search { found, cameras, ways, .. } = search;
@@ -287,7 +291,7 @@ fn study(scene: &str) -> Study {
         name: "tune".into(),
         title: format!("Settings for {scene}"),
         question: "Which settings draw the level with the least error within a time, or in the least time within an error?".into(),
-        reference: "the most accurate settings: Phong shading with soft shadows of twice the default resolution, lamps that do not end, four samples per pixel, and the file's lightmaps; times are those of the slowest camera, and errors those of the camera with the largest error".into(),
+        reference: "the most accurate settings: Phong shading with soft shadows of twice the default resolution, lamps that do not end, four samples per pixel, and the file's lightmaps as half floats; times are those of the slowest camera, and errors those of the camera with the largest error".into(),
         plots: vec![Plot {
             title: "Error over time".into(),
             across: Quantity::Milliseconds,

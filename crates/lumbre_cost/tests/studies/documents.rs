@@ -30,6 +30,12 @@ fn what_the_documents_claim_is_measured_with_known_answers() {
         let patches = point.counts["patches"];
         assert_eq!(point.counts["form factors"], patches * (patches - 1.0));
     }
+    // More patches are closer to the closed form.
+    let pairs = errors("form factors of all pairs");
+    assert!(pairs.is_sorted_by(|coarse, fine| coarse > fine) && pairs.last() < Some(&0.1), "{pairs:?}");
+    // A picture by rays lacks the light between surfaces, which a bake has.
+    let [bake, picture] = ["radiosity", "ray tracing"].map(|series| errors(series)[0]);
+    assert!(bake < 0.1 && picture > 0.2, "{bake} {picture}");
     let power = study.findings.iter().find(|finding| finding.starts_with("With form factors of all pairs"));
     assert!(power.unwrap().contains("grows with their power 2.00"), "{power:?}");
 }

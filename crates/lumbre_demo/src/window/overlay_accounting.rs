@@ -124,6 +124,7 @@ mod tests {
                 effect("idle", None, 0),
             ],
             uploads: lumbre_render::Uploads::default(),
+            lightmaps: lumbre_render::LightmapMemory::default(),
             notes: vec!["not measured: something".to_owned()],
         };
         let context = egui::Context::default();

@@ -245,7 +245,7 @@ mod tests {
     use egui::{Event, Modifiers, PointerButton, Pos2, RawInput};
     use lumbre_cost::{DrawSettings, Spread};
     use lumbre_optics::Shading;
-    use lumbre_scene::ShadowFilter;
+    use lumbre_scene::{LightmapEncoding, ShadowFilter};
 
     use super::*;
 
@@ -260,6 +260,7 @@ mod tests {
             light_threshold: 0.0,
             multisample: false,
             lightmap_reduction: 1,
+            lightmap_format: LightmapEncoding::Rgb16Float,
         };
         let times = [0.98 * milliseconds, milliseconds, 1.02 * milliseconds];
         let milliseconds = Spread::of(&times).expect("there are times");
@@ -439,6 +440,7 @@ mod tests {
             ],
             effects: Vec::new(),
             uploads: lumbre_render::Uploads::default(),
+            lightmaps: lumbre_render::LightmapMemory::default(),
             notes: Vec::new(),
         };
         let context = egui::Context::default();

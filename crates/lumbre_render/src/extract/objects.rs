@@ -10,8 +10,9 @@ use glam::{DAffine3, DVec3};
 use lumbre_mesh::TextureCoordinateSet;
 use lumbre_optics::{Lobe, Material, ReflectionModel, Shading, Surface};
 use lumbre_scene::{
-    Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap, MaterialTextures, Medium,
-    Mesh, Name, ObjectCensus, ObjectTraits, StaticObject, planar_mirror, with_descendants,
+    Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap, LightmapEncoding,
+    MaterialTextures, Medium, Mesh, Name, ObjectCensus, ObjectTraits, SceneSettings, StaticObject,
+    planar_mirror, with_descendants,
 };
 
 use super::entity_slots::EntitySlots;
@@ -123,6 +124,8 @@ pub(crate) struct Objects {
     stale: bool,
     /// The origin of frame space in the world.
     pub origin: DVec3,
+    /// The format in which the scene asks for its lightmaps.
+    lightmap_format: LightmapEncoding,
 }
 
 /// If the camera is farther from the origin of frame space than this, in metres, the origin moves to the
@@ -140,6 +143,7 @@ impl Objects {
             frame: 0,
             stale: false,
             origin: DVec3::ZERO,
+            lightmap_format: LightmapEncoding::default(),
         }
     }
 
@@ -179,6 +183,10 @@ impl Objects {
         if moved {
             self.origin = eye;
         }
+        let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+        let format = settings.frame.lightmap_format;
+        let reformatted = std::mem::replace(&mut self.lightmap_format, format) != format;
+        self.stale |= reformatted;
         let Some((id, mut state)) = self.state.take() else { return Ok(()) };
         if let Ok((query, unfinished, (hidden, children), names)) = state.get(world) {
             let hidden = with_descendants(hidden.iter(), &children);
@@ -248,9 +256,9 @@ impl Objects {
                         None => None,
                     };
                 }
-                if new || map_changed || object.lightmap.is_some() != lightmap.is_some() {
+                if new || map_changed || reformatted || object.lightmap.is_some() != lightmap.is_some() {
                     object.lightmap = match lightmap {
-                        Some(map) => Some(sets.lightmap(gpu, textures, map)?),
+                        Some(map) => Some(sets.lightmap(gpu, textures, map, format)?),
                         None => None,
                     };
                 }
@@ -271,17 +279,23 @@ impl Objects {
             }
         }
         self.state = Some((id, state));
-        self.release(meshes, textures, sets);
+        self.release(gpu, meshes, textures, sets);
         Ok(())
     }
 
     /// Frees the slots of despawned entities, and what only they used.
-    fn release(&mut self, meshes: &mut MeshBuffers, textures: &mut Textures, sets: &mut TextureSets) {
+    fn release(
+        &mut self,
+        gpu: &Gpu,
+        meshes: &mut MeshBuffers,
+        textures: &mut Textures,
+        sets: &mut TextureSets,
+    ) {
         let (frame, census) = (self.frame, &mut self.census);
         let released = self.slots.release(|object| object.seen == frame, |mut object| object.leave(census));
         if std::mem::take(&mut self.stale) || released {
             sets.sweep();
-            textures.sweep();
+            textures.sweep(gpu, self.lightmap_format);
             meshes.sweep();
         }
     }

@@ -391,11 +391,7 @@ impl LightmapFiles {
                 self.images.len() - 1
             }
         };
-        let encoding = match self.encoding.unwrap_or(image.encoding) {
-            LightmapEncoding::Rgb32Float => "rgb32f",
-            LightmapEncoding::Rgb16Float => "rgb16f",
-            LightmapEncoding::Rgb9E5 => "rgb9e5",
-        };
+        let encoding = self.encoding.unwrap_or(image.encoding).name();
         json!({"image": self.uri(&self.images[known].0), "texCoord": 1, "encoding": encoding})
     }
 

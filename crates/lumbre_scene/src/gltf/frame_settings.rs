@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::error::LoadProblem;
 use super::export::SaveError;
 use super::import_scene::unknown;
-use crate::{FrameSettings, ShadowFilter};
+use crate::{FrameSettings, LightmapEncoding, ShadowFilter};
 
 /// `LUMBRE_scene.frame`.
 #[derive(Deserialize, Serialize, Clone, Debug, Default)]
@@ -21,6 +21,8 @@ pub(crate) struct FrameExtension {
     pub shadow_resolution: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shadow_filter: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lightmap_format: Option<String>,
 }
 
 /// The settings in a file, with defaults for missing keys.
@@ -60,12 +62,20 @@ pub(crate) fn read(source: &FrameExtension, place: &str) -> Result<FrameSettings
         })?,
         None => usual.shadow_filter,
     };
+    let lightmap_format = match &source.lightmap_format {
+        Some(name) => LightmapEncoding::from_name(name).ok_or_else(|| {
+            let names = LightmapEncoding::ALL.iter().map(|format| format.name());
+            unknown(place, "LUMBRE_scene.frame.lightmapFormat", name, names)
+        })?,
+        None => usual.lightmap_format,
+    };
     Ok(FrameSettings {
         multisample: source.multisample,
         light_threshold,
         shadows: source.shadows.unwrap_or(usual.shadows),
         shadow_resolution,
         shadow_filter,
+        lightmap_format,
     })
 }
 
@@ -89,11 +99,13 @@ pub(crate) fn written(settings: &FrameSettings) -> Result<Option<FrameExtension>
     let unless = |value: f32, usual: f32| (value != usual).then(|| f64::from(value));
     let resolution = settings.shadow_resolution();
     let filter = Some(settings.shadow_filter).filter(|filter| *filter != usual.shadow_filter);
+    let format = Some(settings.lightmap_format).filter(|format| *format != usual.lightmap_format);
     Ok(Some(FrameExtension {
         multisample: settings.multisample,
         light_threshold: unless(settings.light_threshold.max(0.0), usual.light_threshold),
         shadows: Some(settings.shadows).filter(|shadows| *shadows != usual.shadows),
         shadow_resolution: unless(resolution, usual.shadow_resolution),
         shadow_filter: filter.map(|filter| filter.name().to_owned()),
+        lightmap_format: format.map(|format| format.name().to_owned()),
     }))
 }

@@ -45,16 +45,10 @@ impl Lightmaps {
             return Err(wrong("texCoord", tex_coord.to_string(), "only 1 is supported; bake the file again"));
         }
         let encoding = match source.encoding.as_deref() {
-            Some("rgb32f") => LightmapEncoding::Rgb32Float,
-            Some("rgb16f") | None => LightmapEncoding::Rgb16Float,
-            Some("rgb9e5") => LightmapEncoding::Rgb9E5,
-            Some(other) => {
-                return Err(wrong(
-                    "encoding",
-                    format!("{:?}", shortened(other)),
-                    "use rgb32f, rgb16f or rgb9e5",
-                ));
-            }
+            Some(name) => LightmapEncoding::from_name(name).ok_or_else(|| {
+                wrong("encoding", format!("{:?}", shortened(name)), "use rgb32f, rgb16f or rgb9e5")
+            })?,
+            None => LightmapEncoding::default(),
         };
         let key = (source.image.clone(), encoding);
         if let Some(image) = self.read.get(&key) {

@@ -115,6 +115,59 @@ mod tests {
         }
     }
 
+    /// The algorithm as `EXT_texture_shared_exponent` states it (section "Encode"; the Vulkan specification repeats it
+    /// for `VK_FORMAT_E5B9G9R9_UFLOAT_PACK32`), with N = 9, B = 15, Emax = 31: NaN and negative channels count as 0.
+    fn by_the_specification(color: [f32; 3]) -> u32 {
+        let largest = f64::from(LARGEST);
+        // "max(0, min(sharedexp_max, c))", where NaN gives 0.
+        let [red, green, blue] = color.map(|channel| f64::from(channel).max(0.0).min(largest));
+        let max = red.max(green).max(blue);
+        let preliminary = (max.log2().floor() as i32).max(-16) + 1 + 15;
+        let rounded = (max / 2f64.powi(preliminary - 15 - 9) + 0.5).floor();
+        let exponent = if rounded == 512.0 { preliminary + 1 } else { preliminary };
+        let code = |channel: f64| (channel / 2f64.powi(exponent - 15 - 9) + 0.5).floor() as u32;
+        code(red) | code(green) << 9 | code(blue) << 18 | (exponent as u32) << 27
+    }
+
+    #[test]
+    fn hard_cases_get_the_codes_of_the_specification() {
+        let subnormal = f32::from_bits(1);
+        let half_a_unit = 2f32.powi(-25);
+        let cases = [
+            [0.0; 3],
+            [-0.0, 0.0, -0.0],
+            [subnormal, f32::MIN_POSITIVE, 0.0],
+            [half_a_unit, half_a_unit.next_down(), half_a_unit.next_up()],
+            [LARGEST, LARGEST.next_down(), 0.0],
+            [LARGEST.next_up(), 1.0, f32::MAX],
+            [f32::INFINITY, f32::NEG_INFINITY, 1.0],
+            // One channel dominates, and the others vanish or fall on a tie.
+            [1e4, 1e-4, 0.0],
+            [65_000.0, 64.0, 63.99],
+            [1.0, 1.0 / 512.0, 1.0 / 1024.0],
+            // The largest channel rounds up to the next power of two.
+            [511.5, 511.49997, 1.0],
+            [1f32.next_down(), 0.5, 0.25],
+            [-1.0, -1e30, 0.7],
+        ];
+        for color in cases {
+            let wanted = by_the_specification(color);
+            assert_eq!(
+                encode(Vec3::from_array(color)),
+                wanted,
+                "{color:?}: the specification has {wanted:#010x}"
+            );
+        }
+        // NaN has no code of its own: whoever stores light decides that it is 0, as the specification does.
+        let of_format = |color: [f32; 3]| {
+            let clamped = crate::LightmapEncoding::Rgb9E5.clamped(Vec3::from_array(color));
+            encode(clamped)
+        };
+        for color in [[f32::NAN, 0.25, 3.0], [f32::NAN; 3], [f32::NAN, f32::INFINITY, -1.0]] {
+            assert_eq!(of_format(color), by_the_specification(color), "{color:?}");
+        }
+    }
+
     #[test]
     fn what_is_out_of_range_is_clamped() {
         assert_eq!(decode(encode(Vec3::new(-1.0, 1e30, f32::MAX))), Vec3::new(0.0, LARGEST, LARGEST));

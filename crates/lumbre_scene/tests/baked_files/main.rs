@@ -274,6 +274,7 @@ fn settings_change_and_baked_light_stays_in_any_folder() {
         shadows: false,
         shadow_resolution: 0.5,
         shadow_filter: ShadowFilter::PercentageCloser,
+        lightmap_format: LightmapEncoding::Rgb9E5,
     };
     let settings = FileSettings { shading: Shading::Gouraud, frame, lightmap_reduction: 1 };
     for folder in [folder.path(), other.path()] {
