@@ -134,10 +134,6 @@ impl Branch {
         }
     }
 
-    pub(crate) fn meets_nothing(&mut self, radiance: DVec3) {
-        self.radiance = radiance;
-    }
-
     pub(crate) fn meets(
         &mut self,
         scene: &Scene,

@@ -59,7 +59,7 @@ impl<'a> Estimator<'a> {
         let terms = LightTerms::new(self.aovs.are_wanted());
         match &self.integrator {
             Followed::Trees(tree) => {
-                let seen = tree.grow(camera.ray, camera.farthest, &media, None, terms);
+                let seen = tree.grow(camera.ray, camera.farthest, &media, terms);
                 Sample {
                     radiance: seen.radiance,
                     rays: seen.rays,

@@ -75,6 +75,7 @@ mod path;
 mod random;
 mod ray_rates;
 mod ray_tree;
+mod ray_tree_node;
 mod rendering;
 mod sample_distribution;
 mod scene;

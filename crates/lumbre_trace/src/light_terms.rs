@@ -2,6 +2,8 @@
 //! its way to the eye. Auxiliary pictures of single lights are built from them; the sum itself is not
 //! computed here.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -63,9 +65,9 @@ impl LightTerms {
         self.list.len()
     }
 
-    /// Multiplies all terms from index `first` on by a factor.
-    pub fn scale_since(&mut self, first: usize, factor: DVec3) {
-        self.list[first..].iter_mut().for_each(|term| term.radiance *= factor);
+    /// Multiplies the terms with some indices by a factor.
+    pub fn scale(&mut self, terms: Range<usize>, factor: DVec3) {
+        self.list[terms].iter_mut().for_each(|term| term.radiance *= factor);
     }
 
     /// Removes all terms.

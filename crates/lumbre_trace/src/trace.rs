@@ -15,15 +15,10 @@ use crate::direct_light::Lighting;
 use crate::film::Film;
 use crate::first_hit::{FirstHit, FirstHits};
 use crate::light_aovs::LightAovs;
-use crate::light_terms::LightTerms;
 use crate::options::{Ended, Integrator, Picture, TraceOptions, TraceReport};
 use crate::ray_rates::RayRates;
 use crate::rendering::{Listener, Rendering};
 use crate::view::View;
-
-/// Stack size of a thread in bytes: enough for trees of [`MAXIMUM_DEPTH`](crate::MAXIMUM_DEPTH). Pages that
-/// are never touched cost no memory.
-const STACK: usize = 256 << 20;
 
 /// Traces a picture of a World. `listener` is called from several threads, but never concurrently.
 ///
@@ -79,7 +74,6 @@ impl Tracer {
             Integrator::Path => keeper.kept()?,
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(view.options.threads.unwrap_or(0));
-        let pool = pool.stack_size(STACK);
         let pool = pool.build().map_err(|error| TraceError::Threads { reason: error.to_string() })?;
         let started = Instant::now();
         let rendering = Rendering::new(view, &self.light, listener);
@@ -96,21 +90,11 @@ impl Tracer {
     pub fn tree(&self, place: DVec2) -> Branch {
         let view = &self.view;
         let camera = view.camera.through(place);
-        let mut root = Branch::new(Kind::Camera, &camera.ray, view.scene.origin, DVec3::ONE, DVec3::ONE);
         let tree = view.ray_tree(Lighting { by_light: true, ..view.lighting() });
-        let mut grow = || {
-            let media = view.media_of(&camera.ray);
-            tree.grow(camera.ray, camera.farthest, &media, Some(&mut root), LightTerms::default());
-        };
-        std::thread::scope(|scope| {
-            // Deep trees need more stack than a main thread has.
-            let thread = std::thread::Builder::new().stack_size(STACK);
-            if let Ok(thread) = thread.spawn_scoped(scope, &mut grow) {
-                // The result is in `root`.
-                let _ = thread.join();
-            }
-        });
-        root
+        let recorded = tree.record(camera.ray, camera.farthest, &view.media_of(&camera.ray));
+        recorded.unwrap_or_else(|| {
+            Branch::new(Kind::Camera, &camera.ray, view.scene.origin, DVec3::ONE, DVec3::ONE)
+        })
     }
 
     /// Returns a tree of this tracer in a format, with a newline at its end.
