@@ -10,7 +10,7 @@ use lumbre_render::{Gpu, Renderer};
 use crate::command_line::quoted;
 use crate::converged::ConvergedBakes;
 use crate::rounds::Rounds;
-use crate::shared_bake::SharedBakes;
+use crate::shared_bakes::SharedBakes;
 
 use crate::{CostError, Spread};
 

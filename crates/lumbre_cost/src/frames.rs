@@ -328,7 +328,7 @@ mod tests {
     use crate::converged::ConvergedBakes;
     use crate::findings::{factor, ratio_of};
     use crate::scenes::{Air, assorted_balls, fence, mirror_and_glass, room};
-    use crate::shared_bake::SharedBakes;
+    use crate::shared_bakes::SharedBakes;
 
     #[test]
     fn what_is_compiled_ahead_changes_no_picture_and_no_count() -> Result<(), CostError> {

@@ -28,6 +28,7 @@
 //! ```
 
 mod all_pairs;
+mod bake_once;
 mod baked;
 mod bounce_by_bounce;
 mod clustered_mesh;
@@ -56,7 +57,7 @@ mod rounds;
 mod run;
 mod scene_file;
 mod scenes;
-mod shared_bake;
+mod shared_bakes;
 mod spread;
 mod studies;
 mod table;

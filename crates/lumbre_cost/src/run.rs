@@ -12,7 +12,7 @@ use crate::compile_ahead::device_ahead;
 use crate::converged::ConvergedBakes;
 use crate::folder::{Folder, has_pictures};
 use crate::machine::machine;
-use crate::shared_bake::SharedBakes;
+use crate::shared_bakes::SharedBakes;
 use crate::studies::{STUDIES, StudyKind};
 use crate::{Conditions, CostError, CostReport, Machine, Settings, Study};
 

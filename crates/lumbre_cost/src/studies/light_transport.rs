@@ -13,6 +13,7 @@ use lumbre_trace::{Integrator, TraceOptions};
 
 use super::bake::{ERROR, QUICK_ERROR};
 use super::over_scenes;
+use crate::bake_once::bake_once;
 use crate::baked::{bake_arguments, bake_options, bake_world, few_bakes, nothing_to_bake_in};
 use crate::findings::{cheapest_by_error, error_of, milliseconds, percent, rounded, rounds, times_of};
 use crate::frame::Frame;
@@ -22,7 +23,6 @@ use crate::picture::Picture;
 use crate::rounds::{Repeated, milliseconds_since, repeated};
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;
-use crate::shared_bake::bake_once;
 use crate::traced::{ray_tree, traced};
 use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Spread, Study};
 

@@ -12,6 +12,7 @@ use lumbre_trace::relative_error;
 
 use super::bake::{ERROR, QUICK_ERROR, reference_seconds};
 use super::over_scenes;
+use crate::bake_once::bake_once;
 use crate::baked::{bake_arguments, bake_options, few_bakes, nothing_to_bake};
 use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{counted, factor, listed, percent, ratio_of, rounded, short, times_of};
@@ -22,7 +23,6 @@ use crate::measured::Measured;
 use crate::picture::Picture;
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;
-use crate::shared_bake::bake_once;
 use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Study};
 
 /// Approximate number of texels of the reference; each lower density has a quarter of the texels of the one

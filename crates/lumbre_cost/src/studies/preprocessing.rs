@@ -14,6 +14,7 @@ use lumbre_scene::{
 
 use super::bake::{ERROR, QUICK_ERROR, reference_seconds};
 use super::over_scenes;
+use crate::bake_once::keep_bake;
 use crate::baked::{
     Baked, bake_arguments, bake_direct_light, bake_options, bake_world, few_bakes, maps_of, nothing_to_bake,
     picture_of_maps, texel_error,
@@ -112,7 +113,7 @@ fn of_scene(
     let options_of_truth = converged(conditions, &options, time);
     let (mut baked, samples) =
         bake_world(conditions, scene.open(conditions.aspect())?, &options, None, [part(0.0), part(0.1)])?;
-    conditions.bakes.keep(scene, &options, &mut baked);
+    keep_bake(conditions, scene, &options, &mut baked);
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.1), part(0.3)])?;
     let truth = truth.picture.clone();
     let first = measured.study.points.len();

@@ -33,7 +33,7 @@ use crate::machine::machine;
 use crate::measured::Measured;
 use crate::rounds::Rounds;
 use crate::scene_file::SceneFile;
-use crate::shared_bake::SharedBakes;
+use crate::shared_bakes::SharedBakes;
 use crate::{Conditions, CostError, CostReport, Listener, Plot, Point, Quantity, Settings, Spread, Study};
 
 /// The result of tuning.

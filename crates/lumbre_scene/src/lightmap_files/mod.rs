@@ -13,6 +13,7 @@
 
 mod data_format_descriptor;
 mod encoding_error;
+mod encoding_range;
 mod irradiance_volume;
 pub(crate) mod ktx2;
 mod ktx2_reader;
