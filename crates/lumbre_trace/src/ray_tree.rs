@@ -121,41 +121,31 @@ struct Growth {
 impl RayTree<'_> {
     /// Traces the tree of a camera ray. `terms` is an empty list of the terms of its light.
     pub fn grow(&self, ray: SpaceRay, farthest: f64, media: &MediumStack, terms: LightTerms) -> Seen {
-        let Growth { mut seen, nodes, .. } = self.traced(ray, farthest, media, terms, false);
-        let radiances = radiances(&nodes);
+        let mut growth = Growth::new(terms, false);
+        self.trace_all(ray, farthest, media, &mut growth);
+        let Growth { seen, nodes, .. } = &mut growth;
+        let radiances = radiances(nodes);
         seen.radiance = radiances.first().copied().unwrap_or_default();
         seen.brightest =
             radiances.iter().fold(0.0, |brightest, radiance| brightest.max(radiance.max_element()));
         if seen.terms.are_wanted() {
-            for (node, weight) in nodes.iter().zip(weights(&nodes)) {
+            for (node, weight) in nodes.iter().zip(weights(nodes)) {
                 seen.terms.scale(node.terms.clone(), weight);
             }
         }
-        seen
+        growth.seen
     }
 
     /// Traces the tree of a camera ray and returns all its branches; `None` if the tree has none.
     pub fn record(&self, ray: SpaceRay, farthest: f64, media: &MediumStack) -> Option<Branch> {
-        let Growth { nodes, .. } = self.traced(ray, farthest, media, LightTerms::default(), true);
-        let radiances = radiances(&nodes);
-        recorded(nodes, &radiances)
+        let mut growth = Growth::new(LightTerms::default(), true);
+        self.trace_all(ray, farthest, media, &mut growth);
+        let radiances = radiances(&growth.nodes);
+        recorded(growth.nodes, &radiances)
     }
 
-    fn traced(
-        &self,
-        ray: SpaceRay,
-        farthest: f64,
-        media: &MediumStack,
-        terms: LightTerms,
-        is_recorded: bool,
-    ) -> Growth {
-        let mut growth = Growth {
-            seen: Seen { terms, ..Seen::default() },
-            nodes: Vec::new(),
-            waiting: BinaryHeap::new(),
-            found: 0,
-            is_recorded,
-        };
+    /// Traces all rays of a tree, as far as its limits allow.
+    fn trace_all(&self, ray: SpaceRay, farthest: f64, media: &MediumStack, growth: &mut Growth) {
         let mut next = Some(Box::new(Twig {
             kind: Kind::Camera,
             from: None,
@@ -170,7 +160,7 @@ impl RayTree<'_> {
             below: Vec::new(),
         }));
         while let Some(twig) = next {
-            self.trace(twig, &mut growth);
+            self.trace(twig, growth);
             next = growth.waiting.pop().map(|waiting| waiting.twig);
             if growth.nodes.len() >= self.limits.rays as usize {
                 break;
@@ -178,7 +168,6 @@ impl RayTree<'_> {
         }
         let untraced = std::mem::take(&mut growth.waiting).into_iter().map(|waiting| waiting.twig);
         next.into_iter().chain(untraced).for_each(|twig| growth.cut(&twig));
-        growth
     }
 
     /// Traces one ray: adds its node to the tree, and the rays that start where it ends to those that wait.
@@ -355,6 +344,16 @@ impl RayTree<'_> {
 }
 
 impl Growth {
+    fn new(terms: LightTerms, is_recorded: bool) -> Self {
+        Self {
+            seen: Seen { terms, ..Seen::default() },
+            nodes: Vec::new(),
+            waiting: BinaryHeap::new(),
+            found: 0,
+            is_recorded,
+        }
+    }
+
     /// Counts a ray that is not traced.
     fn cut(&mut self, twig: &Twig) {
         self.seen.cut += twig.heaviness();
