@@ -1,5 +1,7 @@
 //! Measures the memory that a bake of many patches uses: `peak_memory TRIANGLES_ALONG_A_WALL MAP_SIZE [--memory BYTES]
-//! [--final] [--glowing]`; with `--glowing` every triangle of the walls emits light. It reports the stages as they begin and prints, as JSON, the estimate, the peak memory of the process
+//! [--final] [--glowing]`; with `--glowing` every triangle of the walls emits light.
+//!
+//! It reports the stages as they begin and prints, as JSON, the estimate, the peak memory of the process
 //! (VmHWM on Linux) before and after the bake, and the patches.
 
 use std::error::Error;

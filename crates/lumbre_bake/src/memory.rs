@@ -163,7 +163,7 @@ pub(crate) fn patch_resolution(
     Ok((resolution, notes))
 }
 
-/// Bytes for the scene and its emitters. A bake with probes may keep the emitters that light them in lists of their own.
+/// Bytes for the scene and its emitters. A bake with probes may list the emitters that light them once more.
 fn scene_bytes(sources: &Sources<'_>) -> u64 {
     sources.scene.triangles.len() as u64 * TRIANGLE_BYTES + 2 * sources.emitter_bytes()
 }

@@ -1,4 +1,5 @@
-//! Bakes that several studies of a report show and none of them times: each is made once.
+//! Bakes that several studies of a report show: each is made once, so that its time, where a study states it, is that
+//! of a single bake and not of rounds.
 
 use bevy_ecs::prelude::*;
 use lumbre_bake::BakeOptions;

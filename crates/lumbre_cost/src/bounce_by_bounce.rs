@@ -34,6 +34,9 @@ pub struct BounceByBounce {
     pub cast_ms: f64,
 }
 
+/// Largest number of hits that are kept, of 16 bytes each.
+const MOST_HITS: usize = 1 << 25;
+
 /// A texel of one of the images.
 #[derive(Clone, Copy)]
 struct Place {
@@ -63,7 +66,6 @@ struct Surface {
     coordinates: [Vec2; 3],
     image: usize,
     reflectance: Vec3,
-    two_sided: bool,
 }
 
 /// Returns the reason why the bounces of a World cannot be followed one by one, or `None` if they can: only light that
@@ -78,9 +80,10 @@ pub fn not_followed(world: &mut World) -> Option<&'static str> {
 }
 
 impl BounceByBounce {
-    /// Casts `rays` rays from each texel of a World whose lightmaps hold direct light only. Reflectances are those of
-    /// the materials; a texture counts as its mean.
-    pub fn new(world: &mut World, rays: usize) -> Self {
+    /// Casts rays from each texel of a World whose lightmaps hold direct light only: `most_rays`, or fewer where there
+    /// are many texels, so that their hits take half a gigabyte at most. Reflectances are those of the materials; a
+    /// texture counts as its mean, and backs of surfaces reflect nothing.
+    pub fn new(world: &mut World, most_rays: usize) -> Self {
         let begun = Instant::now();
         let (images, surfaces) = surfaces(world);
         let corners: Vec<[Vec3; 3]> = surfaces.iter().map(|surface| surface.corners).collect();
@@ -99,6 +102,7 @@ impl BounceByBounce {
                 points[*known as usize].push(Shown { surface: number, weights });
             }
         }
+        let rays = most_rays.min(MOST_HITS / texels.len().max(1)).max(1);
         let hits = points
             .par_iter()
             .enumerate()
@@ -148,6 +152,11 @@ impl BounceByBounce {
     pub fn share_of_last(&self) -> f64 {
         let sum = |light: &[Vec3]| light.iter().map(|light| f64::from(light.element_sum())).sum::<f64>();
         sum(&self.last) / sum(&self.arrived).max(f64::MIN_POSITIVE)
+    }
+
+    /// Returns the number of rays that are cast from each texel.
+    pub fn rays(&self) -> usize {
+        self.rays
     }
 
     /// Returns the number of texels that light is gathered for.
@@ -204,13 +213,13 @@ fn surfaces(world: &mut World) -> (Vec<Arc<LightmapImage>>, Vec<Surface>) {
         });
         let texture = textures.and_then(|textures| textures.base_color.as_ref());
         let reflectance = material.front.diffuse * texture.map_or(Vec3::ONE, |texture| mean(&texture.image));
-        let (matrix, two_sided) = (place.0, material.double_sided);
+        let matrix = place.0;
         let world_from_mesh = Affine3A {
             matrix3: Mat3::from_cols_array(&matrix.matrix3.to_cols_array().map(|value| value as f32)).into(),
             translation: matrix.translation.as_vec3().into(),
         };
         let of_mesh = surfaces_of(&mesh.0, world_from_mesh, matrix.matrix3.determinant() < 0.0);
-        surfaces.extend(of_mesh.map(|surface| Surface { image, reflectance, two_sided, ..surface }));
+        surfaces.extend(of_mesh.map(|surface| Surface { image, reflectance, ..surface }));
     }
     (images, surfaces)
 }
@@ -242,7 +251,6 @@ fn surfaces_of(
             coordinates: [first, second, third],
             image: 0,
             reflectance: Vec3::ZERO,
-            two_sided: false,
         })
     })
 }
@@ -289,7 +297,8 @@ impl Surface {
         images: &[Arc<LightmapImage>],
         numbers: &[Vec<u32>],
     ) -> Reflected {
-        if direction.dot(self.facing) >= 0.0 && !self.two_sided {
+        // The back of a surface shows no texel, even where the material has one.
+        if direction.dot(self.facing) >= 0.0 {
             return Reflected::default();
         }
         let image = &images[self.image];

@@ -394,9 +394,10 @@ mod tests {
     /// Pairs of frames, one timed by a study and one by `--timings`, and how many times as long the former took.
     const PAIRS: usize = 31;
 
-    /// The same frame of the same scene, drawn warm in turns by two renderers, so that other load on the machine, and how
-    /// the operating system spreads the threads of the process over its cores, affect both alike. Returns the ratio of the
-    /// study's time to that of `--timings`. `slowed` is how often the study draws where it should draw once.
+    /// The same frame of the same scene, drawn warm in turns by two renderers, so that other load on the machine,
+    /// and how the operating system spreads the threads of the process over its cores, affect both alike. Returns
+    /// the ratio of the study's time to that of `--timings`. `slowed` is how often the study draws where it should
+    /// draw once.
     fn ratio_to_timings(
         world: &mut World,
         options: &FrameOptions,

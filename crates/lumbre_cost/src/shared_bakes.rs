@@ -1,4 +1,4 @@
-//! Bakes of a report that several studies show and none of them times. Made by `bake_once`.
+//! Bakes of a report that several studies show. Made by `bake_once`.
 
 use std::cell::RefCell;
 use std::collections::HashMap;

@@ -7,6 +7,7 @@
 //! `light_cone`.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use glam::{DVec3, UVec3};
 
@@ -26,8 +27,8 @@ const MANY_ENTRIES: f64 = 3e6;
 const SAMPLED_LIGHTS: usize = 1000;
 /// Largest number of depth slices.
 const MAX_SLICES: f64 = 96.0;
-/// Slices are given to other cores in groups of at least this many estimated list entries. A group takes some
-/// 0.1 ms, which is several times what waking up another core takes.
+/// Slices are given to other cores in groups of about this many estimated list entries. A group takes some 0.1 ms,
+/// which is several times what waking up another core takes.
 const ENTRIES_PER_TASK: f64 = 16_384.0;
 /// By how much a light's range is enlarged, relative to the range and to the distance from the origin of
 /// frame space. This covers the rounding of points, of the depth and of its logarithm on the device.
@@ -224,9 +225,13 @@ impl LightClusters {
         };
         let tasks = (estimated_entries / ENTRIES_PER_TASK) as usize;
         let (lists, slices_per_task) = (&mut self.slices[..slices], slices.div_ceil(tasks.max(1)));
-        in_groups(lists, slices_per_task, 0, &|first, group: &mut [SliceLists]| {
+        let build = |first, group: &mut [SliceLists]| {
             group.iter_mut().zip(first..).for_each(|(lists, slice)| lists.build(slice, &building));
-        });
+        };
+        match threads().filter(|_| slices_per_task < lists.len()) {
+            Some(threads) => threads.install(|| in_groups(lists, slices_per_task, 0, &build)),
+            None => build(0, lists),
+        }
         // Evaluating any light of a class is harmless: it adds nothing where it does not reach.
         let any = self.spheres.get(second).map_or(none, |sphere| sphere.light);
         self.join([self.black | self.black << 16, black, any]);
@@ -344,6 +349,17 @@ impl LightClusters {
         });
         cells.sum::<f64>() * count as f64 / sampled.max(1) as f64
     }
+}
+
+/// Returns the threads that build lists. They do nothing else, so that a frame never waits for other work of the
+/// program, as it would among the threads of a bake. `None` if the system gives no threads.
+fn threads() -> Option<&'static rayon::ThreadPool> {
+    static THREADS: OnceLock<Option<rayon::ThreadPool>> = OnceLock::new();
+    let start = || {
+        let named = rayon::ThreadPoolBuilder::new().thread_name(|number| format!("lists of lights {number}"));
+        named.build().ok()
+    };
+    THREADS.get_or_init(start).as_ref()
 }
 
 /// Calls `work` for groups of consecutive slices on all cores, with the number of each group's first slice.

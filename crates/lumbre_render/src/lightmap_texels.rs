@@ -1,13 +1,10 @@
 //! Lightmaps as textures of the device: the formats, and the bytes of their texels.
 
-use std::collections::HashSet;
-use std::sync::Arc;
-
 use bevy_ecs::world::World;
 use bytemuck::Pod;
 use glam::Vec3;
 use half::f16;
-use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, PackedFormat};
+use lumbre_scene::{LightmapEncoding, LightmapImage, PackedFormat, shown_lightmaps};
 
 /// The memory of a World's lightmaps on the device, each image counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -74,16 +71,14 @@ pub(crate) fn filterable(features: wgpu::Features, asked: LightmapEncoding) -> L
     }
 }
 
-/// Returns the lightmaps of a World, each image counted once, as a device with these features stores them.
+/// Returns the lightmaps that a World shows, as a device with these features stores them.
 pub(crate) fn lightmaps_of(
     world: &mut World,
     features: wgpu::Features,
     asked: LightmapEncoding,
 ) -> LightmapMemory {
-    let mut known = HashSet::new();
-    let mut maps = world.query::<&Lightmap>();
-    let first = maps.iter(world).filter(|map| known.insert(Arc::as_ptr(&map.image)));
-    LightmapMemory::of(filterable(features, asked), first.map(|map| [map.image.width, map.image.height]))
+    let sizes = shown_lightmaps(world).into_iter().map(|image| [image.width, image.height]);
+    LightmapMemory::of(filterable(features, asked), sizes)
 }
 
 /// Returns the bytes of a lightmap's texels in this format, row by row. Values out of range are clamped by

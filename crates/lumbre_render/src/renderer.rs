@@ -530,7 +530,7 @@ impl Renderer {
         let drawn = decided.batches().map(|batch| (batch.pipeline, batch.texture_set.as_deref()));
         let lit = decided.draws.deferred.iter().map(|class| (class.pipeline, None));
         for (key, set) in drawn.chain(lit) {
-            let warm_up = || self.warm_ups.of(&self.gpu, key, set);
+            let warm_up = || self.warm_ups.of(&self.gpu, key, (set, self.objects.lightmap_format()));
             if !self.pipelines.prepare(&self.gpu, &mut self.sets, key, wait, warm_up)? {
                 awaited.insert(key);
             }

@@ -50,14 +50,19 @@ impl PartialEq for WarmUps {
 
 impl WarmUps {
     /// Returns a job that draws once with a pipeline and a material's textures; `None` if the adapter does
-    /// not compile on the first draw.
-    pub fn of(&self, gpu: &Gpu, key: PipelineKey, textures: Option<&TextureSet>) -> Option<Afterwards> {
+    /// not compile on the first draw. What is compiled also depends on the format of lightmaps.
+    pub fn of(
+        &self,
+        gpu: &Gpu,
+        key: PipelineKey,
+        (textures, lightmaps): (Option<&TextureSet>, LightmapEncoding),
+    ) -> Option<Afterwards> {
         // Variants that count lights are for measurements, where a long frame does not matter.
         if key.variant.has(Feature::CountLights) {
             return None;
         }
         let textures = textures.map(|set| set.stand_ins.clone());
-        self.job(gpu, move |warm_up| warm_up.draw(key, textures.as_ref()))
+        self.job(gpu, move |warm_up| warm_up.draw(key, textures.as_ref(), lightmaps))
     }
 
     /// Returns a job that draws a shadow map once.
@@ -129,7 +134,12 @@ impl WarmUp {
     ///
     /// # Errors
     /// The errors that a frame with this pipeline would have.
-    fn draw(&mut self, key: PipelineKey, textures: Option<&MaterialTextures>) -> Result<(), RenderError> {
+    fn draw(
+        &mut self,
+        key: PipelineKey,
+        textures: Option<&MaterialTextures>,
+        lightmaps: LightmapEncoding,
+    ) -> Result<(), RenderError> {
         self.pipelines.prepare(&self.gpu, &mut self.sets, key, true, || None)?;
         let set = match textures {
             Some(textures) => self.sets.set(&self.gpu, &mut self.textures, textures)?,
@@ -138,7 +148,7 @@ impl WarmUp {
         let g_buffer = key.variant.has(Feature::Deferred).then(|| self.g_buffer_group());
         let baked_light = match key.variant.samples_lightmap() {
             true => {
-                let (name, encoding) = ("warm-up".to_owned(), LightmapEncoding::default());
+                let (name, encoding) = ("warm-up".to_owned(), lightmaps);
                 let texels = vec![glam::Vec3::ZERO; 16];
                 let image = Arc::new(LightmapImage { name, width: 4, height: 4, texels, encoding });
                 Some(self.sets.lightmap(&self.gpu, &mut self.textures, &Lightmap { image }, encoding)?)
@@ -155,7 +165,7 @@ impl WarmUp {
         let groups = [Some(&frame), textures, baked_light.as_deref(), shadows.as_ref()];
         let drawn = self.submit(key, pipeline, groups);
         self.sets.sweep();
-        self.textures.sweep(&self.gpu, LightmapEncoding::default());
+        self.textures.sweep(&self.gpu, lightmaps);
         drawn
     }
 

@@ -1,6 +1,6 @@
 //! Quality settings that a level requests for its frames: multisampling, where lights end, whether shadows
-//! are drawn, with their resolution and filter, and the format of lightmaps on the GPU. They trade quality for speed in the rasterizer only; the baker and the ray tracer
-//! do not read them.
+//! are drawn, with their resolution and filter, and the format of lightmaps on the GPU. They trade quality for
+//! speed in the rasterizer only; the baker and the ray tracer do not read them.
 
 use crate::LightmapEncoding;
 

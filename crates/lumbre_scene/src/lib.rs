@@ -90,5 +90,5 @@ pub use quadric_mesh::QuadricMesh;
 pub use reduced_lightmaps::reduce_lightmaps;
 pub use settings::SceneSettings;
 pub use transform::{GlobalTransform, Transform, propagate_transforms, update_transforms};
-pub use visibility::{hidden_entities, with_descendants};
+pub use visibility::{hidden_entities, shown_lightmaps, with_descendants};
 pub use volume_place::{IrradianceVolumeError, VolumePlace, nearest_volume, usable_irradiance_volumes};

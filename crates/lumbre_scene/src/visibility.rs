@@ -1,10 +1,13 @@
-//! Which entities are hidden by a [`Hidden`] component of their own or of an ancestor. This is not view
-//! culling.
+//! Which entities are hidden by a [`Hidden`] component of their own or of an ancestor, and which lightmaps are
+//! shown by the others. This is not view culling.
+
+use std::collections::HashSet;
+use std::sync::Arc;
 
 use bevy_ecs::entity::EntityHashSet;
 use bevy_ecs::prelude::*;
 
-use crate::Hidden;
+use crate::{Hidden, Lightmap, LightmapImage};
 
 /// The entities with [`Hidden`], and all their descendants.
 pub fn hidden_entities(world: &mut World) -> EntityHashSet {
@@ -12,6 +15,15 @@ pub fn hidden_entities(world: &mut World) -> EntityHashSet {
         bevy_ecs::system::SystemState::<(Query<Entity, With<Hidden>>, Query<&Children>)>::new(world);
     // Fetching queries cannot fail; only a missing resource would be an error.
     state.get(world).map(|(hidden, children)| with_descendants(hidden.iter(), &children)).unwrap_or_default()
+}
+
+/// The lightmaps of objects that are not hidden, each image once.
+pub fn shown_lightmaps(world: &mut World) -> Vec<Arc<LightmapImage>> {
+    let hidden = hidden_entities(world);
+    let mut known = HashSet::new();
+    let mut lit = world.query::<(Entity, &Lightmap)>();
+    let shown = lit.iter(world).filter(|(entity, _)| !hidden.contains(entity)).map(|(_, map)| &map.image);
+    shown.filter(|image| known.insert(Arc::as_ptr(image))).cloned().collect()
 }
 
 /// These entities and all their descendants.

@@ -219,7 +219,8 @@ fn box_of_balls(scene: &Scene, lamps: &[usize]) -> Option<[DVec3; 2]> {
 /// along.
 fn meets([low, high]: [DVec3; 2], origin: DVec3, reciprocal: DVec3) -> bool {
     let (to_low, to_high) = ((low - origin) * reciprocal, (high - origin) * reciprocal);
-    // 0 times infinity, where the origin lies in a side of the box, is not a number, which `min` and `max` pass over.
+    // 0 times infinity, of a ray within a side of the box, is not a number, which `min` and `max` pass over: such a ray may
+    // count as passing by. It passes every ball within, since the box is larger by its margin.
     let enter = (0..3).fold(0.0_f64, |enter, axis| enter.max(to_low[axis].min(to_high[axis])));
     let leave = (0..3).fold(f64::INFINITY, |leave, axis| leave.min(to_low[axis].max(to_high[axis])));
     enter <= leave * (1.0 + MARGIN)

@@ -123,7 +123,8 @@ pub const DEFAULT_DEPTH: u32 = 5;
 pub const DEFAULT_WEIGHT: f64 = 1.0 / 1024.0;
 /// Paths per pixel if neither a number of samples nor an error nor a time is given.
 pub const DEFAULT_PATHS: u32 = 64;
-/// Largest depth allowed: a recorded tree is drawn by recursion.
+/// Largest depth allowed: a recorded tree is drawn by recursion. (No more than twice as many rays follow each other, with
+/// those behind partly covering surfaces, which are no deeper.)
 pub const MAXIMUM_DEPTH: u32 = 1000;
 /// Largest number of samples per pixel allowed.
 pub const MAXIMUM_SAMPLES: u32 = 1 << 20;

@@ -19,11 +19,12 @@ use crate::geometry::{Candidate, SpaceRay};
 use crate::interface::RaySplit;
 use crate::light_terms::{BOUNCED, LightTerms, Source};
 use crate::medium::MediumStack;
+use crate::options::MAXIMUM_DEPTH;
 use crate::ray_tree_node::{Node, radiances, recorded, weights};
 use crate::scene::Scene;
 use crate::surface_point::SurfacePoint;
 
-/// Limits at which the recursion ends.
+/// Limits at which a tree ends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     /// Largest number of mirrored and transmitted rays in succession.
@@ -33,6 +34,10 @@ pub(crate) struct Limits {
     /// Largest number of rays of one tree, shadow rays not counted.
     pub rays: u32,
 }
+
+/// Largest number of rays in succession, those behind partly covering surfaces included, which do not count as depth:
+/// a recorded tree is drawn by recursion.
+pub(crate) const LONGEST_CHAIN: u32 = 2 * MAXIMUM_DEPTH;
 
 /// Traces the trees of a picture.
 pub(crate) struct RayTree<'a> {
@@ -85,6 +90,8 @@ struct Twig {
     media: MediumStack,
     weight: DVec3,
     depth: u32,
+    /// Number of rays before it, from the camera on.
+    length: u32,
     /// Surfaces that reflected or refracted it so far. Going straight through a thin sheet or a partly
     /// covering surface does not count.
     turns: u32,
@@ -136,7 +143,7 @@ impl RayTree<'_> {
         growth.seen
     }
 
-    /// Traces the tree of a camera ray and returns all its branches; `None` if the tree has none.
+    /// Traces the tree of a camera ray and returns all its branches; `None` if the limits allow no ray at all.
     pub fn record(&self, ray: SpaceRay, farthest: f64, media: &MediumStack) -> Option<Branch> {
         let mut growth = Growth::new(LightTerms::default(), true);
         self.trace_all(ray, farthest, media, &mut growth);
@@ -154,6 +161,7 @@ impl RayTree<'_> {
             media: media.clone(),
             weight: DVec3::ONE,
             depth: 0,
+            length: 0,
             turns: 0,
             first: true,
             passed: 0.0,
@@ -228,6 +236,7 @@ impl RayTree<'_> {
                 ray: SpaceRay::leaving(point.position, twig.ray.direction, point.geometric, point.extent),
                 farthest: twig.farthest - point.distance,
                 weight: twig.weight * behind * clear,
+                length: twig.length + 1,
                 passed: twig.passed + point.distance,
                 below: layers.below,
                 ..*twig
@@ -297,6 +306,7 @@ impl RayTree<'_> {
             media,
             weight: weight * factor,
             depth: twig.depth + 1,
+            length: twig.length + 1,
             turns: twig.turns + turns,
             first: false,
             passed: 0.0,
@@ -317,7 +327,8 @@ impl RayTree<'_> {
     /// Adds a ray to those that wait, unless the limits of depth and weight cut it off.
     fn branch_off(&self, twig: Twig, growth: &mut Growth) {
         let heaviness = twig.heaviness();
-        if twig.depth > self.limits.depth || heaviness < self.limits.weight {
+        let is_too_deep = twig.depth > self.limits.depth || twig.length > LONGEST_CHAIN;
+        if is_too_deep || heaviness < self.limits.weight {
             growth.cut(&twig);
             return;
         }

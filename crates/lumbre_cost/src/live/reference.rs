@@ -63,7 +63,7 @@ impl BesideReference {
         if self.compared.is_some() || self.due.is_some_and(|due| begun < due) {
             return Ok(found);
         }
-        let best = Choices::of(world, options.exposure).reference();
+        let best = Choices::of(world, options.exposure).with_format_of(world).reference();
         let exposure = options.exposure.unwrap_or_else(|| exposure_of(world, options));
         let reference = best.drawn(world, options, |world, options| side.radiance(world, options))?;
         let frame = side.radiance(world, options)?;

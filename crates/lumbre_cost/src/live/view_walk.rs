@@ -64,7 +64,7 @@ impl ViewWalk {
         world: &mut World,
         options: &FrameOptions,
     ) -> Result<Self, RenderError> {
-        let choices = Choices::of(world, options.exposure);
+        let choices = Choices::of(world, options.exposure).with_format_of(world);
         let best = choices.reference();
         let reference = best.drawn(world, options, |world, options| side.radiance(world, options))?;
         let reference = radiance(&reference);

@@ -1,13 +1,12 @@
 //! Study of the density of lightmaps and of their format on the device: their sizes and times against what a frame
 //! loses.
 
-use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy_ecs::prelude::*;
 use lumbre_bake::{BakeOptions, BakeReport, Density};
 use lumbre_render::{FrameOptions, LightmapMemory};
-use lumbre_scene::{FrameSettings, Lightmap, LightmapEncoding, SceneSettings, reduce_lightmaps};
+use lumbre_scene::{FrameSettings, LightmapEncoding, SceneSettings, reduce_lightmaps, shown_lightmaps};
 use lumbre_trace::relative_error;
 
 use super::bake::{ERROR, QUICK_ERROR, reference_seconds};
@@ -172,10 +171,8 @@ fn in_format(maps: &Maps, lightmap_format: LightmapEncoding) -> (SceneSettings, 
     let mut world = maps.world.lock().unwrap_or_else(PoisonError::into_inner);
     let own = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
     let settings = SceneSettings { frame: FrameSettings { lightmap_format, ..own.frame }, ..own };
-    let mut lit = world.query::<&Lightmap>();
-    let images: BTreeMap<_, _> =
-        lit.iter(&world).map(|map| (Arc::as_ptr(&map.image), [map.image.width, map.image.height])).collect();
-    (settings, LightmapMemory::of(lightmap_format, images.into_values()))
+    let sizes = shown_lightmaps(&mut world).into_iter().map(|image| [image.width, image.height]);
+    (settings, LightmapMemory::of(lightmap_format, sizes))
 }
 
 fn point(

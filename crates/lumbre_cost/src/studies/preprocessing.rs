@@ -246,15 +246,15 @@ fn by_bounces(
     told: [f64; 2],
     measured: &mut Measured,
 ) -> Result<Vec<Bounced>, CostError> {
-    let Baked { world: mut direct, report } = bake_direct_light(conditions, scene, options, told)?;
-    if let Some(why) = not_followed(&mut direct) {
+    if let Some(why) = not_followed(&mut scene.open(conditions.aspect())?) {
         measured.study.notes.push(format!("There are no single bounces of {}: {why}.", scene.name));
         return Ok(Vec::new());
     }
+    let Baked { world: mut direct, report } = bake_direct_light(conditions, scene, options, told)?;
     let mut light = BounceByBounce::new(&mut direct, conditions.unless_quick(RAYS, FEW_RAYS));
     measured.study.notes.push(format!(
-        "Single bounces: the baker leaves out all of them, and then {} rays from each of the {} texels that show a surface gather one bounce after the other; textures reflect by their mean. With lightmaps without a number of bounces, the baker has solved for all of them.",
-        conditions.unless_quick(RAYS, FEW_RAYS),
+        "Single bounces: the baker leaves out all of them, and then {} rays from each of the {} texels that show a surface gather one bounce after the other; textures reflect by their mean, and backs of surfaces reflect nothing. With lightmaps without a number of bounces, the baker has solved for all of them.",
+        light.rays(),
         light.texels()
     ));
     let mut before = 1e3 * report.seconds;

@@ -2,12 +2,9 @@
 //! coarser and with packed maps too. The time of a frame hardly depends on them, so that what is saved are bytes:
 //! of the maps that keep the goal, those with the fewest are chosen.
 
-use std::collections::HashSet;
-use std::sync::Arc;
-
 use bevy_ecs::prelude::*;
 use lumbre_render::LightmapMemory;
-use lumbre_scene::{Lightmap, LightmapEncoding};
+use lumbre_scene::{LightmapEncoding, shown_lightmaps};
 
 use super::candidates::Candidates;
 use super::draw_settings::DrawSettings;
@@ -28,12 +25,9 @@ const FORMATS: [LightmapEncoding; 2] = [LightmapEncoding::Rgb16Float, LightmapEn
 pub(crate) struct LightmapSizes(Vec<[u32; 2]>);
 
 impl LightmapSizes {
-    /// Returns the sizes of the lightmaps of a World, each once.
+    /// Returns the sizes of the lightmaps that a World shows.
     pub fn of(world: &mut World) -> Self {
-        let mut known = HashSet::new();
-        let mut maps = world.query::<&Lightmap>();
-        let first = maps.iter(world).filter(|map| known.insert(Arc::as_ptr(&map.image)));
-        Self(first.map(|map| [map.image.width, map.image.height]).collect())
+        Self(shown_lightmaps(world).into_iter().map(|image| [image.width, image.height]).collect())
     }
 
     /// Returns true if there are none.

@@ -69,7 +69,8 @@ pub fn panel(root: &Ui, facts: &AccuracyFacts, accounting: Option<&Accounting>) 
         .default_width(WIDTH)
         .show(root.ctx(), |ui| {
             let height = (root.ctx().content_rect().height() - 70.0).max(60.0);
-            ScrollArea::vertical().max_height(height).show(ui, |ui| {
+            // Without a least height, the window keeps egui's default height, and the sliders at the end are out of sight.
+            ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
                 ui.set_max_width(WIDTH);
                 wishes = contents(ui, facts, accounting);
             });
@@ -294,7 +295,7 @@ mod tests {
         }
     }
 
-    /// Lays out the panel; returns all its text with positions, and the request.
+    /// Lays out the panel; returns all its text that is in sight with positions, and the request.
     fn laid_out(
         context: &egui::Context,
         facts: &AccuracyFacts,
@@ -312,7 +313,11 @@ mod tests {
         let mut wishes = Wishes::default();
         let output = context.run_ui(input, |root| wishes = panel(root, facts, None));
         let mut found = Vec::new();
-        output.shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut found));
+        for clipped in &output.shapes {
+            let mut of_shape = Vec::new();
+            texts(&clipped.shape, &mut of_shape);
+            found.extend(of_shape.into_iter().filter(|(place, _)| clipped.clip_rect.contains(*place)));
+        }
         output.drop_without_applying_deltas();
         (found, wishes)
     }
@@ -357,6 +362,20 @@ mod tests {
             let values: Vec<f64> = texts.iter().filter_map(|(_, text)| text.trim().parse().ok()).collect();
             let expected = [ms, error].map(|text| text.parse::<f64>().expect("a number"));
             assert_eq!(values, expected, "{texts:?}");
+        }
+    }
+
+    /// Without the least height of the scrolled area this fails.
+    #[test]
+    fn the_sliders_are_in_sight_under_the_bars_of_many_lights() {
+        let mut facts = facts();
+        let one = facts.lights[0].clone();
+        facts.lights = vec![one; 14];
+        let context = egui::Context::default();
+        laid_out(&context, &facts, Vec::new());
+        let (texts, _) = laid_out(&context, &facts, Vec::new());
+        for wanted in ["ms a frame", "% of error", "next better"] {
+            assert!(texts.iter().any(|(_, text)| text.contains(wanted)), "{wanted} is not in {texts:?}");
         }
     }
 

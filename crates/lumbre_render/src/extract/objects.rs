@@ -147,6 +147,11 @@ impl Objects {
         }
     }
 
+    /// Returns the format in which the scene asks for its lightmaps.
+    pub fn lightmap_format(&self) -> LightmapEncoding {
+        self.lightmap_format
+    }
+
     /// Brings the slots up to date for a frame seen from `eye`. Objects that cannot be drawn are left out,
     /// each with a message in `left_out`.
     pub fn extract(

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::Material;
+use lumbre_optics::{AlphaMode, Material};
 use lumbre_scene::{Medium, Mesh, Transform};
-use lumbre_trace::{Kind, TraceOptions, Tracer};
+use lumbre_trace::{Kind, TraceOptions, Tracer, TreeFormat};
 
 use crate::case::Outcome;
 use crate::mirrors::facing_mirrors;
@@ -17,6 +17,7 @@ crate::cases! {
     "depth 50" {
         fifty_mirrors_are_a_series, what_lies_behind_them_is_within_the_bound, fifty_sheets_of_glass,
         fifty_faces_of_glass, one_less_does_not_arrive,
+        thousands_of_sheets_that_hardly_cover,
     }
     "weight 10^-6" {
         mirrors_down_to_a_millionth, the_rays_it_takes, the_weight_it_states, a_weight_of_zero_ends_by_depth,
@@ -98,6 +99,25 @@ fn one_less_does_not_arrive() -> Outcome {
         1e-15,
         "stated weight of what was cut off: all that a depth of 50 brings",
     )
+}
+
+fn thousands_of_sheets_that_hardly_cover() -> Outcome {
+    // What continues straight behind a sheet does not count as depth. A tree of all 3,000 branches would be too deep
+    // to be drawn.
+    let mut world = sheets(3000, 0.0, true);
+    let mut materials = world.query::<&mut Material>();
+    for mut material in materials.iter_mut(&mut world) {
+        (material.alpha, material.alpha_mode) = (1e-4, AlphaMode::Blend);
+    }
+    let options = TraceOptions { size: (1, 1), ..to_depth(50) };
+    let (picture, report) = draw(&mut world, &options);
+    let tracer = Tracer::new(&mut world, &options).expect("the options are valid");
+    let branches = tracer.draw_tree(&tracer.tree(DVec2::splat(0.5)), TreeFormat::Text);
+    assert!(branches.lines().count() > 2000, "{} lines", branches.lines().count());
+    assert_eq!(picture.radiance[0], DVec3::ZERO);
+    let expected = (1.0 - f64::from(1e-4_f32)).powi(2001);
+    let comment = "stated weight of what was cut off: all that 2,001 sheets let pass";
+    Outcome::number(expected, report.cut.largest_weight, 1e-12, comment)
 }
 
 fn a_millionth() -> TraceOptions {
