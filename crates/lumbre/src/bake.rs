@@ -7,13 +7,19 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use bevy_ecs::query::With;
 use bevy_ecs::world::World;
+use glam::Vec3;
 use lumbre::bake::{
     BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Samples,
     SamplesError, Solver, content_hash,
 };
 use lumbre::demo::{ATLAS_SIDE, has_light_to_bake};
-use lumbre::scene::{LightmapEncoding, SaveOptions, SceneSettings, Supercompression, save_baked};
+use lumbre::optics::{Material, Surface};
+use lumbre::scene::{
+    LightmapEncoding, MaterialTextures, SaveOptions, SceneSettings, StaticObject, Supercompression,
+    save_baked,
+};
 
 use crate::arguments::{Bake, BakeFormFactors, BakeProbes, BakeQuality, BakeSolver, ExrTexels};
 use crate::bake_record::{Asked, BakeRecord, folder_of_bake, hash_of_files};
@@ -30,6 +36,7 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         world.resource_mut::<SceneSettings>().sky = sky;
     }
     check_light(&mut world, asked)?;
+    note_metals(&mut world, &asked.input);
     let options = options(asked);
     let files = save_options(asked);
     let what = Asked {
@@ -245,6 +252,28 @@ fn check_light(world: &mut World, asked: &Bake) -> anyhow::Result<()> {
         "{input}: there is nothing to bake: it has no light that is baked, no emission and no sky; \
          `lumbre bake {input} -o {output} --sky 1` bakes it under an even white sky"
     )
+}
+
+/// Says how many static meshes lightmaps do not light: metals, which have no diffuse reflection. Many programs export
+/// painted surfaces so.
+fn note_metals(world: &mut World, input: &Path) {
+    let mut objects = world.query_filtered::<(&Material, Option<&MaterialTextures>), With<StaticObject>>();
+    let (mut count, mut metals) = (0, 0);
+    for (material, textures) in objects.iter(world) {
+        // A texture says which parts are metal.
+        let by_texture = textures.is_some_and(|textures| textures.metallic_roughness.is_some());
+        let Surface { diffuse, specular, .. } = material.front;
+        count += 1;
+        metals += u32::from(!by_texture && diffuse == Vec3::ZERO && specular != Vec3::ZERO);
+    }
+    if metals > 0 {
+        eprintln!(
+            "lumbre: note: {}: {metals} of {count} static meshes are metal: lightmaps hold diffuse light, which metal does \
+             not reflect, so that they are black where no lamp shines on them in a frame; for paint, cloth or wood set \
+             metallicFactor to 0",
+            input.display()
+        );
+    }
 }
 
 /// Returns true if two paths lead to the same existing file, through links or not.

@@ -397,6 +397,20 @@ fn what_cannot_work_is_said_before_the_bake() {
 }
 
 #[test]
+fn metal_which_lightmaps_do_not_light_is_reported() {
+    let place = place();
+    assert!(!stderr(&done(&mut place.bake(&[]))).contains("metal"));
+    let mut world = World::new();
+    let cube = Mesh(Arc::new(lumbre::mesh::shapes::cuboid(Vec3::ONE, 1)));
+    let metal = Material::from_metallic_roughness(Vec3::new(0.6, 0.4, 0.3), 1.0, 1.0);
+    world.spawn((cube.clone(), metal, StaticObject, Transform::default()));
+    world.spawn((cube, Material::matt(Vec3::ONE), StaticObject, Transform::from_xyz(0.0, 3.0, 0.0)));
+    lumbre::scene::save(&mut world, &place.level).unwrap();
+    let said = stderr(&done(&mut place.bake(&["--sky", "1"])));
+    assert!(said.contains("1 of 2 static meshes are metal"), "{said}");
+}
+
+#[test]
 fn a_folder_that_takes_no_files_is_said_before_the_bake() {
     use std::os::unix::fs::PermissionsExt;
     let place = place();
