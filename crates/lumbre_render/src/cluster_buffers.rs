@@ -1,11 +1,12 @@
 //! The GPU's copies of a frame's clusters: the grid, the lists, and the compact records of their lights. The
 //! content of the lists is computed in `light_clusters`.
 
+use crate::cluster_grid::ClusteredView;
 use crate::extract::{LightClass, SceneLights, UNIFORM_LIGHTS};
 use crate::frame_bindings::FrameBuffer;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{ClusterGridData, InverseSquareLightData};
-use crate::light_clusters::{BoundingSphere, ClusteredView, LightClusters};
+use crate::light_clusters::{BoundingSphere, LightClusters};
 use crate::shadow_light::BLACK_SHADOWED;
 use crate::table_texture::TableTexture;
 use crate::{Gpu, RenderError};

@@ -40,6 +40,7 @@
 
 mod accounting;
 mod cluster_buffers;
+mod cluster_grid;
 mod draws;
 mod effect_costs;
 mod effect_shares;

@@ -3,15 +3,16 @@
 //! range reaches it, and a fragment evaluates only those. The lists are exact, not an approximation: a light
 //! that is missing from a cluster is 0 everywhere in it. They are built on the CPU for every frame in which
 //! something moved, slice by slice on all cores. The shader that reads them is shaders/light_clusters.wesl; the
-//! lists of whole objects are in `light_lists`, and what the cone of a spotlight does not touch is found by
-//! `light_cone`.
+//! grid itself is in `cluster_grid`, the lists of whole objects are in `light_lists`, and what the cone of a spotlight
+//! does not touch is found by `light_cone`.
 
 use std::ops::Range;
 use std::sync::OnceLock;
 
 use glam::{DVec3, UVec3};
 
-use crate::extract::{CameraView, ConeReach, ViewVolume};
+use crate::cluster_grid::{Axis, ClusteredView, Depths, Edge};
+use crate::extract::ConeReach;
 use crate::layout::ClusterGridData;
 use crate::light_cone::LightCone;
 
@@ -25,8 +26,6 @@ const MANY_CLUSTERS: f64 = 131_072.0;
 const MANY_ENTRIES: f64 = 3e6;
 /// Number of lights that the list entries are estimated from, if there are more.
 const SAMPLED_LIGHTS: usize = 1000;
-/// Largest number of depth slices.
-const MAX_SLICES: f64 = 96.0;
 /// Slices are given to other cores in groups of about this many estimated list entries. A group takes some 0.1 ms,
 /// which is several times what waking up another core takes.
 const ENTRIES_PER_TASK: f64 = 16_384.0;
@@ -34,8 +33,6 @@ const ENTRIES_PER_TASK: f64 = 16_384.0;
 /// frame space. This covers the rounding of points, of the depth and of its logarithm on the device.
 const RANGE_MARGIN: f64 = 1e-4;
 const DISTANCE_MARGIN: f64 = 2e-6;
-/// Slices overlap by this fraction of a slice, for the same reason.
-const SLICE_MARGIN: f64 = 2e-3;
 
 /// A sphere that contains all points that a light reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,20 +45,6 @@ pub(crate) struct BoundingSphere {
     pub radius: f64,
     /// The cone that the light does not leave, if it is a spotlight.
     pub cone: Option<ConeReach>,
-}
-
-/// The view that a grid is built for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ClusteredView {
-    pub view: CameraView,
-    /// Origin of frame space in the world.
-    pub origin: DVec3,
-    /// Width and height in pixels.
-    pub size: [u32; 2],
-    /// Depth range along the line of sight that contains anything to light, in metres.
-    pub depths: [f64; 2],
-    /// No tile has a shorter side than this, in pixels.
-    pub finest_tile: u32,
 }
 
 /// The light lists of a frame. Its vectors are reused from frame to frame.
@@ -151,36 +134,6 @@ struct Span {
     light: u32,
 }
 
-/// One screen axis of the grid. A coordinate on it is x (or y) divided by depth in a perspective view, and x
-/// itself otherwise.
-#[derive(Clone, Copy, Debug)]
-struct Axis {
-    first: f64,
-    step: f64,
-    count: u32,
-    perspective: bool,
-}
-
-/// The plane at an edge of a row: through the eye in a perspective view, otherwise parallel to the line of
-/// sight. The signed distance of a point from it is y `normal_y` + depth `normal_depth` - `offset`, positive
-/// below.
-#[derive(Clone, Copy, Debug)]
-struct Edge {
-    normal_y: f64,
-    normal_depth: f64,
-    offset: f64,
-}
-
-/// The depth axis. In a perspective view the slices have equal ratios, so that clusters are about as deep as
-/// they are wide; otherwise they have equal depths.
-#[derive(Clone, Copy, Debug)]
-struct Depths {
-    count: u32,
-    scale: f64,
-    bias: f64,
-    logarithmic: bool,
-}
-
 impl LightClusters {
     /// Builds the lists of the three classes of lights: inverse-square lights, those with a shadow, and others.
     /// Lights of the first class are numbered from 0, and the number after the last one is a black light. An
@@ -228,7 +181,8 @@ impl LightClusters {
         let build = |first, group: &mut [SliceLists]| {
             group.iter_mut().zip(first..).for_each(|(lists, slice)| lists.build(slice, &building));
         };
-        match threads().filter(|_| slices_per_task < lists.len()) {
+        let threads = if slices_per_task < lists.len() { threads() } else { None };
+        match threads {
             Some(threads) => threads.install(|| in_groups(lists, slices_per_task, 0, &build)),
             None => build(0, lists),
         }
@@ -494,24 +448,6 @@ fn saturated(count: usize) -> u32 {
     u32::try_from(count).unwrap_or(u32::MAX)
 }
 
-impl ClusteredView {
-    /// Returns a direction of the world in view space: to the right, downwards, along the line of sight.
-    fn turned(&self, direction: DVec3) -> DVec3 {
-        let basis = self.view.basis;
-        let mirrored = match self.view.volume {
-            ViewVolume::Perspective { .. } => [1.0; 2],
-            ViewVolume::Orthographic { half_width, half_height, .. } => {
-                [half_width.signum(), half_height.signum()]
-            }
-        };
-        DVec3::new(
-            direction.dot(basis.x_axis) * mirrored[0],
-            -direction.dot(basis.y_axis) * mirrored[1],
-            -direction.dot(basis.z_axis),
-        )
-    }
-}
-
 /// Returns by how much a light's sphere is enlarged, in metres.
 fn margin(view: &ClusteredView, sphere: &BoundingSphere) -> f64 {
     let from_origin = (sphere.center - view.origin).length();
@@ -576,8 +512,8 @@ impl ViewSphere {
 
     /// Returns a sphere around the part of this one that lies between the planes of a row.
     fn in_row(&self, [top, bottom]: [Edge; 2]) -> Option<Self> {
-        let above = top.distance(self);
-        let below = bottom.distance(self);
+        let above = top.distance(self.y, self.depth);
+        let below = bottom.distance(self.y, self.depth);
         let (edge, distance) = match (above < 0.0, below > 0.0) {
             (true, _) => (top, above),
             (_, true) => (bottom, below),
@@ -593,139 +529,13 @@ impl ViewSphere {
     }
 }
 
-impl Edge {
-    fn new(axis: &Axis, edge: u32) -> Self {
-        let coordinate = axis.first + axis.step * f64::from(edge);
-        if !axis.perspective {
-            return Self { normal_y: 1.0, normal_depth: 0.0, offset: coordinate };
-        }
-        let length = (1.0 + coordinate * coordinate).sqrt();
-        Self { normal_y: 1.0 / length, normal_depth: -coordinate / length, offset: 0.0 }
-    }
-
-    fn distance(&self, sphere: &ViewSphere) -> f64 {
-        sphere.y * self.normal_y + sphere.depth * self.normal_depth - self.offset
-    }
-}
-
-impl Axis {
-    /// Returns the columns and rows of tiles with this side in pixels, from the frame's upper left corner.
-    /// The last ones may extend beyond the frame.
-    fn both(view: &ClusteredView, side: u32) -> [Self; 2] {
-        let (half, perspective) = match view.view.volume {
-            ViewVolume::Perspective { half_width, half_height, .. } => ([half_width, half_height], true),
-            ViewVolume::Orthographic { half_width, half_height, .. } => {
-                ([half_width.abs(), half_height.abs()], false)
-            }
-        };
-        [0, 1].map(|axis| Self {
-            first: -half[axis],
-            step: 2.0 * half[axis] * f64::from(side) / f64::from(view.size[axis]),
-            count: view.size[axis].div_ceil(side),
-            perspective,
-        })
-    }
-
-    /// Returns the middle of a tile at a depth, and how far the tile extends from there at most between
-    /// depths that are `half_depth` away; `far` is the greater of them.
-    fn tile(&self, tile: u32, depth: f64, far: f64, half_depth: f64) -> (f64, f64) {
-        let middle = self.first + self.step * (f64::from(tile) + 0.5);
-        match self.perspective {
-            true => (middle * depth, middle.abs() * half_depth + 0.5 * self.step * far),
-            false => (middle, 0.5 * self.step),
-        }
-    }
-
-    /// Returns the first and the last tile that a sphere reaches.
-    fn span(&self, place: f64, depth: f64, radius: f64) -> Option<[u32; 2]> {
-        let (least, most) = match self.perspective {
-            true => tangents(place, depth, radius),
-            false => (place - radius, place + radius),
-        };
-        let [first, last] = [least, most].map(|place| (place - self.first) / self.step);
-        let count = f64::from(self.count);
-        // Casts to u32 round down and saturate.
-        (last >= 0.0 && first < count).then(|| [first.max(0.0) as u32, last.min(count - 1.0) as u32])
-    }
-}
-
-/// Returns the least and the largest place / depth of a disc as seen from the origin; infinite where the
-/// tangent does not meet anything in front.
-fn tangents(place: f64, depth: f64, radius: f64) -> (f64, f64) {
-    let squared = place * place + depth * depth - radius * radius;
-    if squared <= 0.0 {
-        return (f64::NEG_INFINITY, f64::INFINITY);
-    }
-    let length = squared.sqrt();
-    let [least, most] = [depth * length + place * radius, depth * length - place * radius];
-    (
-        if least > 0.0 { (place * length - depth * radius) / least } else { f64::NEG_INFINITY },
-        if most > 0.0 { (place * length + depth * radius) / most } else { f64::INFINITY },
-    )
-}
-
-impl Depths {
-    /// Creates slices between two depths. Nearer points belong to the first slice, farther ones to the last.
-    fn new(view: &ClusteredView, side: u32, near: f64, far: f64) -> Self {
-        let [columns, rows] = Axis::both(view, side);
-        let width = columns.step.min(rows.step);
-        let one = Self { count: 1, scale: 0.0, bias: 0.0, logarithmic: columns.perspective };
-        let extent = far - near;
-        // There is no light or no object in this range.
-        if extent.is_nan() || extent <= 0.0 {
-            return one;
-        }
-        if !columns.perspective {
-            let count = ((far - near) / width).ceil().clamp(1.0, MAX_SLICES);
-            let scale = count / (far - near);
-            return Self { count: count as u32, scale, bias: -near * scale, ..one };
-        }
-        let near = near.max(far * 1e-9);
-        let octaves = (far / near).log2();
-        // Slices are as deep as tiles are wide, or deeper if there would be too many.
-        let per_octave = 1.0 / (1.0 + width).log2();
-        let count = (octaves * per_octave).ceil().clamp(1.0, MAX_SLICES);
-        let scale = count / octaves;
-        Self { count: count as u32, scale, bias: -near.log2() * scale, ..one }
-    }
-
-    fn slice(&self, depth: f64) -> f64 {
-        let along = if self.logarithmic { depth.max(f64::MIN_POSITIVE).log2() } else { depth };
-        along * self.scale + self.bias
-    }
-
-    /// Returns the first and the last slice that a sphere reaches; `None` if it lies behind the eye.
-    fn span(&self, depth: f64, radius: f64) -> Option<[u32; 2]> {
-        if self.logarithmic && depth + radius <= 0.0 {
-            return None;
-        }
-        let end = f64::from(self.count - 1);
-        let first = self.slice(depth - radius) - SLICE_MARGIN;
-        let last = self.slice(depth + radius) + SLICE_MARGIN;
-        // Casts to u32 round down.
-        Some([first, last].map(|slice| slice.clamp(0.0, end) as u32))
-    }
-
-    /// Returns the depths at which a slice begins and ends.
-    fn bounds(&self, slice: u32) -> [f64; 2] {
-        let depth = |place: f64| {
-            let along = (place - self.bias) / self.scale;
-            if self.logarithmic { along.exp2() } else { along }
-        };
-        let nearest = if self.logarithmic { 0.0 } else { f64::NEG_INFINITY };
-        [
-            if slice == 0 { nearest } else { depth(f64::from(slice) - SLICE_MARGIN) },
-            if slice + 1 == self.count { f64::INFINITY } else { depth(f64::from(slice + 1) + SLICE_MARGIN) },
-        ]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use bevy_ecs::world::World;
     use lumbre_scene::{Camera, GlobalTransform, Projection, Transform};
 
     use super::*;
+    use crate::extract::CameraView;
 
     struct Random(u64);
 

@@ -11,6 +11,7 @@ use lumbre_optics::{ErrorBound, Shading};
 use lumbre_scene::{SceneSettings, ShadowFilter, propagate_transforms};
 
 use crate::accounting::FrameShares;
+use crate::cluster_grid::ClusteredView;
 use crate::draws::{ChooseShading, Draws, VisibleObjects};
 use crate::effect_shares::EffectShares;
 use crate::effects::{self, BuiltIn, Effect, Stage};
@@ -28,7 +29,6 @@ use crate::growable_buffer::GrowableBuffer;
 use crate::irradiance_volumes::IrradianceVolumes;
 use crate::layout::{InstanceData, LightData, radiance};
 use crate::ledger::{Ledger, OpenFrame};
-use crate::light_clusters::ClusteredView;
 use crate::light_counter::{CountedStages, LightCounter};
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::{Attribute, MeshBuffers};
