@@ -69,6 +69,7 @@ modules!(
     "optics/fresnel",
     "optics/half_vector",
     "optics/lambert",
+    "optics/metal_reflectance",
     "optics/microfacet_reflection",
     "optics/microfacets",
     "optics/normal_map",

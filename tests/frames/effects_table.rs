@@ -98,6 +98,13 @@ fn ranged(light: Light) -> Light {
     Light { attenuation: Attenuation { range: 20.0, ..light.attenuation }, ..light }
 }
 
+/// Adds an irradiance volume around the ball.
+fn in_a_volume(scene: &mut Scene) {
+    let cubes = vec![AmbientCube([Vec3::splat(0.5); 6]); 8];
+    let volume = IrradianceVolume { resolution: UVec3::splat(2), cubes, inside: Vec::new() };
+    scene.world.spawn((volume, Transform::from_scale(4.0)));
+}
+
 fn settings(scene: &mut Scene, change: impl FnOnce(&mut SceneSettings)) {
     change(&mut scene.world.resource_mut::<SceneSettings>());
 }
@@ -424,11 +431,19 @@ const ROWS: &[Row] = &[
         called_for_by: "an `IrradianceVolume` that can be used, and a lit mesh without `Lightmap`",
         features: &["IRRADIANCE_VOLUME"],
         before: point_light,
-        add: |scene| {
-            let cubes = vec![AmbientCube([Vec3::splat(0.5); 6]); 8];
-            let volume = IrradianceVolume { resolution: UVec3::splat(2), cubes, inside: Vec::new() };
-            scene.world.spawn((volume, Transform::from_scale(4.0)));
+        add: in_a_volume,
+    },
+    Row {
+        effect: "metals under baked light",
+        called_for_by: "a lightmap or a volume, and a highlight of `Lobe::EnergyConserving` with a coefficient above .04",
+        features: &["BAKED_METAL"],
+        before: |scene| {
+            point_light(scene);
+            in_a_volume(scene);
+            material(scene, |material| material.lobe = Lobe::EnergyConserving);
+            material(scene, |material| material.front.specular = Vec3::splat(0.04));
         },
+        add: |scene| material(scene, |material| material.front.specular = Vec3::splat(0.4)),
     },
     Row {
         effect: "base colour textures",

@@ -26,6 +26,7 @@ mod light_counts;
 mod light_lists;
 mod lightmap_formats;
 mod materials;
+mod metals;
 mod mirrors;
 mod missing_pipelines;
 mod models;

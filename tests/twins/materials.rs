@@ -117,6 +117,22 @@ fn energy_conserving() -> [Twin; 4] {
     ]
 }
 
+fn metals() -> [Twin; 2] {
+    [
+        Twin::new("metal_reflectance", "lobe_albedo", &[], &[Type::Number], Type::Number)
+            .expect(|x| lobe_albedo(x[0]))
+            .within(|_| bound::lobe_albedo())
+            .random(|s| vec![s.decades(-3.0, 6.0)])
+            .corners(product(&[&[&EXPONENTS[..], &[-1.0]].concat()]))
+            .range(0.4, 1.0),
+        Twin::new("metal_reflectance", "metal_reflectance", &[], &[Type::Vector, Type::Number], Type::Vector)
+            .expect(|x| metal_reflectance(vector(x, 0), x[3]))
+            .within(|x| bound::metal_reflectance(vector(x, 0), x[3]))
+            .random(|s| vec![s.next(), s.next(), s.next(), s.decades(-3.0, 6.0)])
+            .corners(crossed(&product(&[&[0.0, 0.04], &[0.5], &[1.0, 1000.0]]), &product(&[&EXPONENTS[..]]))),
+    ]
+}
+
 pub fn twins() -> Vec<Twin> {
-    normal_maps().into_iter().chain(occlusions()).chain(energy_conserving()).collect()
+    normal_maps().into_iter().chain(occlusions()).chain(energy_conserving()).chain(metals()).collect()
 }

@@ -17,8 +17,8 @@ use lumbre::bake::{
 use lumbre::demo::{ATLAS_SIDE, has_light_to_bake};
 use lumbre::optics::{Material, Surface};
 use lumbre::scene::{
-    LightmapEncoding, MaterialTextures, SaveOptions, SceneSettings, StaticObject, Supercompression,
-    save_baked,
+    LightmapEncoding, MaterialTextures, MetallicRoughnessTexture, SaveOptions, SceneSettings, StaticObject,
+    Supercompression, save_baked,
 };
 
 use crate::arguments::{Bake, BakeFormFactors, BakeProbes, BakeQuality, BakeSolver, ExrTexels};
@@ -254,23 +254,24 @@ fn check_light(world: &mut World, asked: &Bake) -> anyhow::Result<()> {
     )
 }
 
-/// Says how many static meshes lightmaps do not light: metals, which have no diffuse reflection. Many programs export
-/// painted surfaces so.
+/// Says how many static meshes are metal: without diffuse reflection, they take baked light by what stands for their
+/// highlight. Many programs export painted surfaces so.
 fn note_metals(world: &mut World, input: &Path) {
     let mut objects = world.query_filtered::<(&Material, Option<&MaterialTextures>), With<StaticObject>>();
     let (mut count, mut metals) = (0, 0);
     for (material, textures) in objects.iter(world) {
-        // A texture says which parts are metal.
-        let by_texture = textures.is_some_and(|textures| textures.metallic_roughness.is_some());
         let Surface { diffuse, specular, .. } = material.front;
+        let whole = |slot: &MetallicRoughnessTexture| {
+            slot.metallic == 1.0 && slot.texture.image.rgba.chunks(4).all(|texel| texel[2] == u8::MAX)
+        };
+        let by_texture = textures.and_then(|textures| textures.metallic_roughness.as_ref()).map(whole);
         count += 1;
-        metals += u32::from(!by_texture && diffuse == Vec3::ZERO && specular != Vec3::ZERO);
+        metals += u32::from(by_texture.unwrap_or(diffuse == Vec3::ZERO && specular != Vec3::ZERO));
     }
     if metals > 0 {
         eprintln!(
-            "lumbre: note: {}: {metals} of {count} static meshes are metal: lightmaps hold diffuse light, which metal does \
-             not reflect, so that they are black where no lamp shines on them in a frame; for paint, cloth or wood set \
-             metallicFactor to 0",
+            "lumbre: note: {}: {metals} of {count} static meshes are metal, which reflects baked light only by its \
+             highlight and is darker for it; for paint, cloth or wood set metallicFactor to 0",
             input.display()
         );
     }

@@ -12,9 +12,12 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use bevy_ecs::world::World;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use lumbre::optics::{Material, Surface};
-use lumbre::scene::{Camera, Mesh, StaticObject, Transform};
+use lumbre::scene::{
+    Camera, MaterialTextures, Mesh, MetallicRoughnessTexture, Sampler, StaticObject, TextureReference,
+    Transform,
+};
 
 const LUMBRE: &str = env!("CARGO_BIN_EXE_lumbre");
 
@@ -397,17 +400,38 @@ fn what_cannot_work_is_said_before_the_bake() {
 }
 
 #[test]
-fn metal_which_lightmaps_do_not_light_is_reported() {
+fn metals_are_counted() {
     let place = place();
     assert!(!stderr(&done(&mut place.bake(&[]))).contains("metal"));
     let mut world = World::new();
     let cube = Mesh(Arc::new(lumbre::mesh::shapes::cuboid(Vec3::ONE, 1)));
     let metal = Material::from_metallic_roughness(Vec3::new(0.6, 0.4, 0.3), 1.0, 1.0);
-    world.spawn((cube.clone(), metal, StaticObject, Transform::default()));
+    world.spawn((cube.clone(), metal.clone(), StaticObject, Transform::default()));
+    // By a texture, a mesh may be metal as a whole or in parts.
+    for (blue, x) in [(255, 3.0), (0, -3.0)] {
+        let rgba = vec![255, 255, 255, 255, 255, 255, blue, 255];
+        let image = lumbre::scene::Image { name: "metal".into(), width: 2, height: 1, rgba };
+        let slot = MetallicRoughnessTexture {
+            texture: TextureReference {
+                image: Arc::new(image),
+                sampler: Sampler::default(),
+                tex_coord: 0,
+                offset: Vec2::ZERO,
+                rotation: 0.0,
+                scale: Vec2::ONE,
+            },
+            base_color: Vec3::ONE,
+            metallic: 1.0,
+            roughness: 1.0,
+            dielectric: Vec3::splat(0.04),
+        };
+        let textures = MaterialTextures { metallic_roughness: Some(slot), ..MaterialTextures::default() };
+        world.spawn((cube.clone(), metal.clone(), textures, StaticObject, Transform::from_xyz(x, 0.0, 0.0)));
+    }
     world.spawn((cube, Material::matt(Vec3::ONE), StaticObject, Transform::from_xyz(0.0, 3.0, 0.0)));
     lumbre::scene::save(&mut world, &place.level).unwrap();
     let said = stderr(&done(&mut place.bake(&["--sky", "1"])));
-    assert!(said.contains("1 of 2 static meshes are metal"), "{said}");
+    assert!(said.contains("2 of 4 static meshes are metal"), "{said}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Hashes of everything that a bake's result depends on. They show whether a scene has to be baked again and which of
 //! its objects have changed, and they keep a checkpoint from being resumed by another bake. What the result does not
-//! depend on is left out, such as cameras, specular reflection and the number of threads.
+//! depend on is left out, such as cameras, the highlights of dielectrics and the number of threads.
 //!
 //! Options, lights and materials are hashed as their debugging text, in which every number can be read back exactly, with
 //! what does not matter set to a default: a field that is added to them counts until it is set to a default here. Other
@@ -13,12 +13,14 @@ use std::sync::Arc;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{AlphaMode, Light, Material, Surface};
+use lumbre_optics::{AlphaMode, Light, Lobe, Material, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 use serde::{Deserialize, Serialize};
 
 use crate::bounds::Bounds;
-use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, from_world};
+use crate::scene::{
+    PlacedLight, PlacedPrimitive, SceneObject, StaticScene, from_world, reflectance_as_metal,
+};
 use crate::{BakeError, BakeOptions};
 
 /// The version of the baker: that of the crate, and a hash of its sources and of the crates that influence a baked
@@ -139,7 +141,7 @@ fn object_hash(object: &SceneObject, images: &mut Images) -> ContentHash {
         // `lights_frames` concerns only the probes and is hashed with them.
         let PlacedPrimitive { mesh, material, textures, transform, lights_frames: _ } = primitive;
         hasher.mesh(mesh);
-        let textures = textures.as_ref().map(|textures| images.textures(textures));
+        let textures = textures.as_ref().map(|textures| images.textures(textures, material.lobe));
         hasher.text(&(baked_part(material), textures.unwrap_or_default(), transform));
     }
     hasher.text(&(name, lightmap_scale, primitives.len()))
@@ -153,13 +155,13 @@ fn light_hash(placed: &PlacedLight) -> ContentHash {
     Hasher::new("light").text(&(baked, position, axis))
 }
 
-/// What is baked of a material: diffuse reflection, emission and opacity, but not specular reflection, mirrors and
-/// refraction.
+/// What is baked of a material: diffuse reflection, what stands for the highlight of a metal (in place of its
+/// coefficient), emission and opacity, but neither mirrors nor refraction.
 fn baked_part(material: &Material) -> Material {
     let unused = Material::default();
     let surface = |surface: &Surface| Surface {
         ambient: unused.front.ambient,
-        specular: unused.front.specular,
+        specular: reflectance_as_metal(material.lobe, surface),
         shininess: unused.front.shininess,
         ..*surface
     };
@@ -185,12 +187,13 @@ struct Images(HashMap<*const Image, ContentHash>);
 impl Images {
     /// What is baked of a material's textures: normal and occlusion maps are ignored, as a lightmap holds the light on
     /// the geometric surface (docs/decisions.md says why).
-    fn textures(&mut self, textures: &MaterialTextures) -> [Option<String>; 3] {
+    fn textures(&mut self, textures: &MaterialTextures, lobe: Lobe) -> [Option<String>; 3] {
         let MaterialTextures { base_color, emissive, metallic_roughness, normal: _, occlusion: _ } = textures;
         let metallic_roughness = metallic_roughness.as_ref().map(|metallic_roughness| {
-            let MetallicRoughnessTexture { texture, base_color, metallic, roughness: _, dielectric: _ } =
+            let MetallicRoughnessTexture { texture, base_color, metallic, roughness, dielectric } =
                 metallic_roughness;
-            format!("{} {base_color:?} {metallic:?}", self.texture(texture))
+            let of_metal = (lobe == Lobe::EnergyConserving).then_some((roughness, dielectric));
+            format!("{} {base_color:?} {metallic:?} {of_metal:?}", self.texture(texture))
         });
         let [base_color, emissive] =
             [base_color, emissive].map(|texture| texture.as_ref().map(|texture| self.texture(texture)));

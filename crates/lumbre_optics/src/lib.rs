@@ -63,6 +63,7 @@ mod light_matrix;
 mod light_validation;
 mod material;
 mod material_validation;
+mod metal_reflectance;
 mod microfacet_reflection;
 mod microfacets;
 mod normal_map;
@@ -114,6 +115,7 @@ pub use light_matrix::{LightMatrix, ReflectionMatrix};
 pub use light_validation::{LARGEST_INTENSITY, LightError};
 pub use material::{AlphaMode, Lobe, Material, SHARP_SHININESS, Surface};
 pub use material_validation::{LARGEST_COEFFICIENT, MaterialError};
+pub use metal_reflectance::{lobe_albedo, metal_reflectance};
 pub use microfacet_reflection::{
     Distribution, Fresnel, fresnel_normal_reflectance, microfacet_lobe, microfacet_reflection,
     try_fresnel_normal_reflectance,

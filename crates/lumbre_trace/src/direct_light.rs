@@ -4,8 +4,8 @@
 
 use glam::DVec3;
 use lumbre_optics::{
-    BakeMode, Contribution, LightKind, evaluate_light, light_contribution, polygon_light_contribution,
-    transmitted_highlight,
+    BakeMode, Contribution, LightKind, SurfaceSample, evaluate_light, light_contribution,
+    polygon_light_contribution, transmitted_highlight,
 };
 
 use crate::coplanar::EndSurface;
@@ -26,7 +26,7 @@ pub(crate) struct DirectLight {
     pub specular: DVec3,
     /// Highlights of lights behind a transmissive surface.
     pub transmitted: DVec3,
-    /// k_d E/π of the lightmap.
+    /// Light of the lightmap.
     pub baked: DVec3,
     pub emission: DVec3,
     /// Number of shadow rays.
@@ -80,7 +80,7 @@ pub(crate) fn direct_light(
     let object = &scene.objects[point.object];
     let mut light = DirectLight { emission: point.emission, ..DirectLight::default() };
     let mapped = point.baked.is_some();
-    light.baked = point.baked.unwrap_or(DVec3::ZERO);
+    let mut of_metal = point.baked.map_or(DVec3::ZERO, |baked| baked.metal);
     // Both lightmaps and irradiance volumes hold the indirect light that the ambient term stands for.
     let indirect = mapped || point.from_volume.is_some();
     light.ambient_of_scene = match point.from_volume {
@@ -96,10 +96,10 @@ pub(crate) fn direct_light(
         if sample.attenuation * sample.spot == 0.0 || (indirect && placed.light.kind == LightKind::Ambient) {
             continue;
         }
-        let mut added = light_contribution(object.model, point.surface, &sample, point.normal, viewer);
-        if mapped && placed.light.bake == BakeMode::Static {
-            added.diffuse = DVec3::ZERO;
-        }
+        let in_lightmap = mapped && placed.light.bake == BakeMode::Static;
+        let surface = if in_lightmap { as_in_lightmap(point) } else { point.surface };
+        let mut added = light_contribution(object.model, surface, &sample, point.normal, viewer);
+        let highlighted = if in_lightmap { std::mem::take(&mut added.diffuse) } else { DVec3::ZERO };
         light.ambient += added.ambient;
         let mut through = DVec3::ZERO;
         if passing != DVec3::ZERO && !object.medium.thin {
@@ -114,7 +114,7 @@ pub(crate) fn direct_light(
             );
             through = passing * sample.specular * (sample.attenuation * sample.spot * highlight);
         }
-        if added.diffuse + added.specular + through == DVec3::ZERO {
+        if added.diffuse + added.specular + through + highlighted == DVec3::ZERO {
             light.add_ambient(number, added.ambient, lighting);
             continue;
         }
@@ -134,25 +134,26 @@ pub(crate) fn direct_light(
         } else {
             DVec3::ONE
         };
+        of_metal -= visibility * highlighted;
         light.add(number, visibility, added, through, lighting);
     }
     for (number, polygon) in scene.polygons.iter().enumerate() {
         if polygon.emitter == point.object {
             continue;
         }
+        let in_lightmap = mapped && polygon.baked;
+        let surface = if in_lightmap { as_in_lightmap(point) } else { point.surface };
         let mut added = polygon_light_contribution(
             object.model,
-            point.surface,
+            surface,
             &polygon.light,
             point.position,
             point.normal,
             viewer,
         );
-        if mapped && polygon.baked {
-            added.diffuse = DVec3::ZERO;
-        }
+        let highlighted = if in_lightmap { std::mem::take(&mut added.diffuse) } else { DVec3::ZERO };
         light.ambient += added.ambient;
-        if added.diffuse + added.specular == DVec3::ZERO {
+        if added.diffuse + added.specular + highlighted == DVec3::ZERO {
             light.add_ambient(scene.lights.len() + number, added.ambient, lighting);
             continue;
         }
@@ -162,9 +163,17 @@ pub(crate) fn direct_light(
             light.rays += rays;
             visibility = sum;
         }
+        of_metal -= visibility * highlighted;
         light.add(scene.lights.len() + number, visibility, added, DVec3::ZERO, lighting);
     }
+    // The highlights of baked lights are there already.
+    light.baked = point.baked.map_or(DVec3::ZERO, |baked| baked.diffuse) + of_metal.max(DVec3::ZERO);
     light
+}
+
+/// Returns the surface as its lightmap sees it: what stands for a metal's highlight is its only diffuse reflection.
+fn as_in_lightmap(point: &SurfacePoint) -> SurfaceSample {
+    SurfaceSample { diffuse: point.surface.reflectance_as_metal(), ..point.surface }
 }
 
 impl DirectLight {

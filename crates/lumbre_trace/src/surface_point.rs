@@ -28,14 +28,24 @@ pub(crate) struct SurfacePoint {
     pub emission: DVec3,
     /// Opacity of an alpha-blended surface, 0 to 1; 1 for all others.
     pub coverage: f64,
-    /// k_d E/π of the lightmap.
-    pub baked: Option<DVec3>,
-    /// k_d E/π of the irradiance volume that lights an object without a lightmap.
+    /// The light of the lightmap.
+    pub baked: Option<BakedLight>,
+    /// The light of the irradiance volume that lights an object without a lightmap: k_d E/π, and the same for what
+    /// stands for a metal's highlight.
     pub from_volume: Option<DVec3>,
     /// Largest coordinate of the surface that was hit, to which rounding errors are relative.
     pub extent: f64,
     /// Index of the triangle in the scene; `None` on exact surfaces.
     pub triangle: Option<u32>,
+}
+
+/// What a surface reflects of the light in its lightmap.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BakedLight {
+    /// k_d E/π.
+    pub diffuse: DVec3,
+    /// What stands for a metal's highlight: the metal's reflectance times E/π.
+    pub metal: DVec3,
 }
 
 /// Largest difference, relative to the distance, between the f64 hit and the f32 hit of the hierarchy up to
@@ -129,10 +139,18 @@ impl SurfacePoint {
         }
         let baked = object.lightmap.as_ref().map(|image| {
             let uv = object.coordinates(1, vertices, weights);
-            surface.diffuse * sample_lightmap(image, uv) * unoccluded
+            let arriving = sample_lightmap(image, uv) * unoccluded;
+            BakedLight {
+                diffuse: surface.diffuse * arriving,
+                metal: surface.reflectance_as_metal() * arriving,
+            }
         });
         let normal = facing_normal(normal, lit_as_front);
-        let from_volume = object.volume_light(position, normal, surface.diffuse * unoccluded);
+        let from_volume = object.volume_light(
+            position,
+            normal,
+            (surface.diffuse + surface.reflectance_as_metal()) * unoccluded,
+        );
         Self {
             object: hit.candidate.object,
             position,
@@ -166,7 +184,11 @@ impl SurfacePoint {
             emission: object.material.surface(lit_as_front).emission.as_dvec3(),
             coverage: coverage(object, f64::from(object.material.alpha)),
             baked: None,
-            from_volume: object.volume_light(position, lit_normal, surface.diffuse),
+            from_volume: object.volume_light(
+                position,
+                lit_normal,
+                surface.diffuse + surface.reflectance_as_metal(),
+            ),
             // The point is as uncertain as the coordinates of the ray's origin.
             extent: position.abs().max(ray.origin.abs()).max_element(),
             triangle: None,

@@ -22,6 +22,8 @@ pub(super) struct PixelWeights {
 struct Lit {
     ambient: DVec3,
     direct: DVec3,
+    /// What a metal would reflect, as diffuse light, of the lights in its lightmap.
+    highlighted: DVec3,
 }
 
 /// A triangle with what is computed once for it.
@@ -67,9 +69,11 @@ impl<'a> ShadedTriangle<'a> {
         let uv =
             |set: u32| -> DVec2 { (0..3).map(|i| vertices[i].uv[usize::from(set != 0)] * weights[i]).sum() };
         let lit = match self.colors {
-            Some(colors) => {
-                Lit { ambient: mix(colors.map(|lit| lit.ambient)), direct: mix(colors.map(|lit| lit.direct)) }
-            }
+            Some(colors) => Lit {
+                ambient: mix(colors.map(|lit| lit.ambient)),
+                direct: mix(colors.map(|lit| lit.direct)),
+                highlighted: mix(colors.map(|lit| lit.highlighted)),
+            },
             None => {
                 let normal = |weights: [f64; 3]| -> DVec3 {
                     safe_normalize((0..3).map(|i| vertices[i].normal * weights[i]).sum())
@@ -99,7 +103,9 @@ impl<'a> ShadedTriangle<'a> {
         let mut color = lit.direct + lit.ambient * unoccluded;
         if let Some(lightmap) = &self.object.lightmap {
             let baked = sample_lightmap(lightmap, uv(1)) * unoccluded;
-            color += self.object.material.surface(self.lit_as_front()).diffuse.as_dvec3() * baked;
+            let surface = SurfaceSample::new(&self.object.material, self.lit_as_front());
+            color += surface.diffuse * baked;
+            color += (surface.reflectance_as_metal() * baked - lit.highlighted).max(DVec3::ZERO);
         }
         match &self.scene.settings.fog {
             Some(fog) => {
@@ -141,49 +147,62 @@ impl<'a> ShadedTriangle<'a> {
         let mapped = self.object.lightmap.is_some();
         let mut sum = Contribution::ZERO;
         if let Some(volume) = scene.volume.as_ref().filter(|_| !mapped) {
-            sum.ambient += surface.diffuse * volume.light(point, normal);
+            let unfiltered = SurfaceSample::new(&self.object.material, front);
+            sum.ambient +=
+                (surface.diffuse + unfiltered.reflectance_as_metal()) * volume.light(point, normal);
         } else if !mapped {
             sum.ambient +=
                 surface.ambient * (scene.settings.ambient.as_dvec3() + scene.settings.sky.as_dvec3());
         }
-        for (_, added) in self.contributions(surface, point, normal, viewer) {
+        let mut highlighted = DVec3::ZERO;
+        for (_, added, in_lightmap) in self.contributions(surface, point, normal, viewer) {
             sum = sum + added;
+            highlighted += in_lightmap;
         }
         let ambient = sum.ambient;
         let direct = Contribution { ambient: DVec3::ZERO, ..sum };
-        Lit { ambient, direct: add_emission(direct.total(), side.emission.as_dvec3()) }
+        Lit { ambient, direct: add_emission(direct.total(), side.emission.as_dvec3()), highlighted }
     }
 
     /// Returns what each light adds at a point, and whether frames evaluate it there, which they do not for ambient
-    /// lights and lights that are off.
+    /// lights and lights that are off; third, what a metal would reflect of the light as diffuse light, if its lightmap
+    /// holds the light.
     fn contributions(
         &self,
         surface: SurfaceSample,
         point: DVec3,
         normal: DVec3,
         viewer: DVec3,
-    ) -> impl Iterator<Item = (bool, Contribution)> {
+    ) -> impl Iterator<Item = (bool, Contribution, DVec3)> {
         let (scene, reflection) = (self.scene, self.object.reflection);
         let mapped = self.object.lightmap.is_some();
+        let unfiltered = SurfaceSample::new(&self.object.material, self.lit_as_front());
+        let metal = unfiltered.reflectance_as_metal();
+        let as_metal = SurfaceSample { diffuse: metal, ..surface };
         let of_lights = scene.lights.iter().map(move |(light, position, axis)| {
             let sample: LightSample = evaluate_light(light, *position, *axis, point);
             let mut added = light_contribution(reflection, surface, &sample, normal, viewer);
             if (mapped || scene.volume.is_some()) && light.kind == LightKind::Ambient {
                 added = Contribution::ZERO;
             }
+            let mut highlighted = DVec3::ZERO;
             if mapped && light.bake == lumbre_optics::BakeMode::Static {
                 added.diffuse = DVec3::ZERO;
+                highlighted = light_contribution(reflection, as_metal, &sample, normal, viewer).diffuse;
             }
-            (light.enabled && light.kind != LightKind::Ambient, added)
+            (light.enabled && light.kind != LightKind::Ambient, added, highlighted)
         });
         let polygons = scene.polygons.iter().filter(|polygon| polygon.emitter != self.object.index);
         let of_polygons = polygons.map(move |polygon| {
             let light = &polygon.light;
             let mut added = polygon_light_contribution(reflection, surface, light, point, normal, viewer);
+            let mut highlighted = DVec3::ZERO;
             if mapped && polygon.baked {
                 added.diffuse = DVec3::ZERO;
+                let as_metal = polygon_light_contribution(reflection, as_metal, light, point, normal, viewer);
+                highlighted = as_metal.diffuse;
             }
-            (true, added)
+            (true, added, highlighted)
         });
         of_lights.chain(of_polygons)
     }
@@ -217,8 +236,8 @@ impl<'a> ShadedTriangle<'a> {
         let surface = SurfaceSample::new(&self.object.material, self.lit_as_front());
         let viewer = viewer_direction(scene.settings.local_viewer, scene.eye, scene.basis.z_axis, point);
         self.contributions(surface, point, self.facing(normal), viewer)
-            .filter(|(evaluated, _)| *evaluated)
-            .map(|(_, added)| added.total().max_element())
+            .filter(|(evaluated, ..)| *evaluated)
+            .map(|(_, added, _)| added.total().max_element())
             .collect()
     }
 }

@@ -122,3 +122,15 @@ pub fn gltf_reflection(directions: [DVec3; 3], shininess: f64, specular: DVec3) 
     let other = fresnel * if in_front { 0.0 } else { lobe };
     Allowed::from(error).or(open, || Numbers::from_slice(&other.to_array()))
 }
+
+/// lobe_albedo: 20 u. α is off by 12 u (a sum, a quotient and a root), where the polynomial's slope is at most .75;
+/// its steps are below 2.3 in size, and each is multiplied by α.
+pub fn lobe_albedo() -> f64 {
+    20.0 * U
+}
+
+/// metal_reflectance: that of the albedo, and 4 u of the coefficient; .04 is off by 1 u of itself, before 1/.96.
+pub fn metal_reflectance(specular: DVec3, shininess: f64) -> Allowed {
+    let value = optics::metal_reflectance(specular, shininess);
+    Allowed::from(value * (5.0 * U) + (specular.abs() / 0.96) * (lobe_albedo() + U) + FLUSHED)
+}

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3, Vec4};
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{AlphaMode, Material};
+use lumbre_optics::{AlphaMode, Lobe, Material, Surface, SurfaceSample, shininess_from_roughness};
 use lumbre_scene::{MaterialTextures, TextureReference};
 
 use super::texture::sample;
@@ -48,9 +48,10 @@ impl SurfaceMaterial {
     pub fn is_black(&self) -> bool {
         let Material { front, back, unlit, .. } = &self.material;
         let metallic = self.textures.as_ref().is_some_and(|textures| textures.metallic_roughness.is_some());
-        let black =
-            front.diffuse == Vec3::ZERO && back.as_ref().is_none_or(|back| back.diffuse == Vec3::ZERO);
-        *unlit || (black && !metallic)
+        let black = |side: &Surface| {
+            side.diffuse == Vec3::ZERO && reflectance_as_metal(self.material.lobe, side) == Vec3::ZERO
+        };
+        *unlit || (black(front) && back.as_ref().is_none_or(black) && !metallic)
     }
 
     /// Whether its emission varies within a triangle.
@@ -101,7 +102,7 @@ impl SurfaceMaterial {
         }
     }
 
-    /// Diffuse reflectance ρ, each channel in [0, 0.999].
+    /// Diffuse reflectance ρ, each channel in [0, 0.999]: k_d, and what stands for the highlight of a metal.
     pub fn reflectance(&self, side: Side, vertices: [u32; 3], weights: [f32; 3]) -> Vec3 {
         if self.material.unlit {
             return Vec3::ZERO;
@@ -110,18 +111,22 @@ impl SurfaceMaterial {
             (Side::Back, Some(back)) => back,
             _ => &self.material.front,
         };
-        let mut diffuse = surface.diffuse;
+        let mut surface = *surface;
+        let mut tint = self.color(vertices, weights).truncate();
         if let Some(textures) = &self.textures {
-            if let Some(metallic) = &textures.metallic_roughness {
-                let blue = self.read(&metallic.texture, vertices, weights, false).z;
-                diffuse = metallic.base_color * (1.0 - metallic.metallic * blue);
-            }
             if let Some(base) = &textures.base_color {
-                diffuse *= self.read(base, vertices, weights, true).truncate();
+                tint *= self.read(base, vertices, weights, true).truncate();
+            }
+            if let Some(slot) = &textures.metallic_roughness {
+                let texel = self.read(&slot.texture, vertices, weights, false);
+                let metallic = slot.metallic * texel.z;
+                surface.diffuse = slot.base_color * (1.0 - metallic);
+                surface.specular = slot.dielectric.lerp(slot.base_color * tint, metallic);
+                surface.shininess = shininess_from_roughness(slot.roughness * texel.y);
             }
         }
-        diffuse *= self.color(vertices, weights).truncate();
-        clean(diffuse).min(Vec3::splat(LARGEST_REFLECTANCE))
+        let reflected = surface.diffuse * tint + reflectance_as_metal(self.material.lobe, &surface);
+        clean(reflected).min(Vec3::splat(LARGEST_REFLECTANCE))
     }
 
     /// Emitted radiance, W/(m² sr).
@@ -170,6 +175,11 @@ impl SurfaceMaterial {
         let uv: Vec2 = (0..3).map(|i| coordinates[vertices[i] as usize] * weights[i]).sum();
         sample(texture, uv, srgb)
     }
+}
+
+/// The diffuse reflectance that stands for the highlight of a side of a material with this lobe.
+pub(crate) fn reflectance_as_metal(lobe: Lobe, side: &Surface) -> Vec3 {
+    SurfaceSample { lobe, ..SurfaceSample::from(side) }.reflectance_as_metal().as_vec3()
 }
 
 /// Replaces negative, infinite and NaN channels by 0.

@@ -22,7 +22,7 @@ mod texture_coordinates;
 mod triangles;
 
 pub(crate) use crossings::Face;
-pub(crate) use material::{ShownTexels, Side, SurfaceMaterial};
+pub(crate) use material::{ShownTexels, Side, SurfaceMaterial, reflectance_as_metal};
 
 pub(crate) use from_world::{Entities, from_world};
 pub(crate) use layouter::{Layouter, density_of};

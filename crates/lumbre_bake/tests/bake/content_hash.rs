@@ -10,7 +10,7 @@ use glam::{Vec2, Vec3};
 use lumbre_bake::{
     Bake, BakeOptions, ContentHash, Density, FormFactorMethod, Probes, Quality, Solver, content_hash,
 };
-use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, SpotCone, Surface};
+use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Lobe, Material, SpotCone, Surface};
 use lumbre_scene::{
     Camera, DynamicObject, EmissiveLight, Hidden, Image, LightmapScale, MaterialTextures, Mesh,
     MetallicRoughnessTexture, Name, Sampler, TextureReference, Transform, Wrap,
@@ -118,7 +118,48 @@ fn everything_of_a_texture_that_is_read_changes_the_hash() {
     add("no emission", textured(|t| t.emissive = None));
     add("no metal", textured(|t| t.metallic_roughness = None));
     let roughness = textured(|t| t.metallic_roughness.as_mut().unwrap().roughness = 0.9);
-    assert_eq!(roughness, textured(|_| {}), "highlights are not baked");
+    assert_eq!(roughness, textured(|_| {}), "bare highlights are not baked");
+}
+
+#[test]
+fn what_stands_for_the_highlight_of_a_metal_changes_the_hash() {
+    let look = |base: Vec3, metallic: f32, roughness: f32| {
+        let mut look = Material::from_metallic_roughness(base, metallic, roughness);
+        // Compared by its highlight alone.
+        look.front.diffuse = Vec3::splat(0.1);
+        hash(|world| material(world, |material| *material = look))
+    };
+    let metal = look(Vec3::splat(0.9), 1.0, 0.6);
+    assert_ne!(metal, look(Vec3::splat(0.9), 1.0, 0.7));
+    assert_ne!(metal, look(Vec3::splat(0.8), 1.0, 0.6));
+    assert_eq!(look(Vec3::splat(0.9), 0.0, 0.6), look(Vec3::splat(0.2), 0.0, 0.9), "plastics have none");
+    let by_texture = |roughness: f32, lobe: Lobe| {
+        let mut world = corner();
+        let image = Image { name: "grey".into(), width: 1, height: 1, rgba: vec![200; 4] };
+        let texture = TextureReference {
+            image: Arc::new(image),
+            sampler: Sampler::default(),
+            tex_coord: 0,
+            offset: Vec2::ZERO,
+            rotation: 0.0,
+            scale: Vec2::ONE,
+        };
+        let slot = MetallicRoughnessTexture {
+            texture,
+            base_color: Vec3::ONE,
+            metallic: 1.0,
+            roughness,
+            dielectric: Vec3::splat(0.04),
+        };
+        let floor = object(&mut world, "floor");
+        let textures = MaterialTextures { metallic_roughness: Some(slot), ..MaterialTextures::default() };
+        world.entity_mut(floor).insert(textures);
+        material(&mut world, |material| material.lobe = lobe);
+        content_hash(&mut world, &BakeOptions::default()).unwrap()
+    };
+    let energy_conserving = by_texture(0.5, Lobe::EnergyConserving);
+    assert_ne!(energy_conserving, by_texture(0.6, Lobe::EnergyConserving));
+    assert_ne!(energy_conserving, by_texture(0.5, Lobe::Bare));
 }
 
 #[test]

@@ -11,7 +11,7 @@ use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{Bake, BakeError, BakeOptions, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light};
+use lumbre_optics::{BakeMode, Light, Material, SurfaceSample};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
 fn draft(side: u32) -> BakeOptions {
@@ -31,9 +31,15 @@ fn irradiances(world: &mut World) -> Vec<DVec3> {
 #[test]
 fn furnace() {
     // A closed room of uniform emission L and reflectance ρ: every surface receives E = πL / (1 - ρ).
-    for reflectance in [0.2f32, 0.8] {
+    let emission = Vec3::new(1.0, 0.5, 0.25);
+    // A metal has no k_d: what stands for its highlight is reflected.
+    let mut metal = Material::from_metallic_roughness(Vec3::splat(0.9), 1.0, 0.6);
+    metal.front.emission = emission;
+    let of_metal = SurfaceSample::new(&metal, true).reflectance_as_metal().x as f32;
+    assert!((0.7..0.9).contains(&of_metal), "{of_metal}");
+    let matt = |reflectance: f32| (matt(Vec3::splat(reflectance), emission), reflectance);
+    for (material, reflectance) in [matt(0.2), matt(0.8), (metal, of_metal)] {
         let mut world = World::new();
-        let material = matt(Vec3::splat(reflectance), Vec3::new(1.0, 0.5, 0.25));
         let entity = world.spawn((room(Vec3::new(2.0, 1.0, 1.5)), material, StaticObject)).id();
         let report = run(&mut world, &draft(48));
         assert!(report.energy_lost < 0.01 && report.warnings.is_empty(), "{report:?}");

@@ -9,6 +9,7 @@ mod irradiance_volume;
 mod light_counts;
 mod lightmap;
 mod lights;
+mod metal;
 mod specular;
 mod specular_antialiasing;
 mod textures;
@@ -143,6 +144,7 @@ pub(crate) fn variant(
         two_sided::call,
         lightmap::call,
         irradiance_volume::call,
+        metal::call,
         lights::call,
         light_counts::call,
         specular::call,

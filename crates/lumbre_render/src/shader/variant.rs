@@ -148,6 +148,8 @@ features! {
     GBufferDetails = 58 => "G_BUFFER_DETAILS",
     /// Lights the surfaces in the G-buffer.
     Deferred = 59 => "DEFERRED",
+    /// Reflects baked light like a metal.
+    BakedMetal = 61 => "BAKED_METAL",
 }
 
 /// The feature flag of shaders that read the tables of a frame: whether the tables are textures.
@@ -295,6 +297,7 @@ impl Variant {
                 | Feature::TwoSided as u64
                 | Feature::Lightmap as u64
                 | Feature::IrradianceVolume as u64
+                | Feature::BakedMetal as u64
                 | Feature::NormalTexture as u64
                 | Feature::OcclusionTexture as u64
                 | Feature::MetallicRoughnessTexture as u64);

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DVec3, Vec3};
 use lumbre_optics::{
     ConeOverObject, Highlight, InterpolationError, LightKind, LightOverObject, MINIMUM_COSINE_DIFFERENCE,
-    ReflectionModel, SpotCone, Surface, interpolation_error,
+    ReflectionModel, SpotCone, Surface, interpolation_error, metal_reflectance,
 };
 
 use super::Conditions;
@@ -239,9 +239,13 @@ impl LitPatch<'_> {
         let of = |lit: bool, color: Vec3, coefficient: fn(&Surface) -> Vec3| {
             if lit && !dark { sides.reflected(color, coefficient) } else { 0.0 }
         };
-        let (ambient, diffuse, specular) = (
+        let diffuse = match lamp.reach.baked && sides.lightmapped {
+            false => of(true, light.diffuse, |side| side.diffuse),
+            // A metal takes back what its lightmap holds of the light.
+            true => of(surface.traits.metal, light.diffuse, reflectance_as_metal),
+        };
+        let (ambient, specular) = (
             sides.reflected(light.ambient, |side| side.ambient),
-            of(!(lamp.reach.baked && sides.lightmapped), light.diffuse, |side| side.diffuse),
             of(true, light.specular, |side| side.specular),
         );
         if ambient == 0.0 && diffuse == 0.0 && specular == 0.0 {
@@ -288,6 +292,11 @@ impl LitPatch<'_> {
         let direction = to_eye.try_normalize().unwrap_or(DVec3::Y);
         (direction, patch.half_angle(to_eye.length(), self.room), distance)
     }
+}
+
+/// Returns the diffuse reflectance that stands for a side's highlight.
+fn reflectance_as_metal(side: &Surface) -> Vec3 {
+    metal_reflectance(side.specular.as_dvec3(), f64::from(side.shininess_in_range())).as_vec3()
 }
 
 /// Which side of a surface a light may reach.

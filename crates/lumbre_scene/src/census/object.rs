@@ -2,9 +2,11 @@
 //! and that the census counts. The decisions are made in the renderer.
 
 use bevy_ecs::prelude::*;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use lumbre_mesh::{MeshPlane, TriangleMesh};
-use lumbre_optics::{AlphaMode, Distribution, Fresnel, Lobe, Material, ReflectionModel, Shading, Surface};
+use lumbre_optics::{
+    AlphaMode, Distribution, Fresnel, Lobe, Material, ReflectionModel, Shading, Surface, metal_reflectance,
+};
 
 use crate::{
     DynamicObject, EmissiveLight, Lightmap, MaterialTextures, Medium, Mesh, StaticObject, hidden_entities,
@@ -43,6 +45,9 @@ pub struct ObjectTraits {
     pub lightmapped: bool,
     /// Whether its specular lobe is glTF's energy-conserving one.
     pub energy_conserving: bool,
+    /// Whether it reflects baked light like a metal: its lobe is energy-conserving, and its specular
+    /// coefficient, on either side or by a metallic-roughness texture, exceeds that of a dielectric.
+    pub metal: bool,
     /// Its microfacet distribution, for the Torrance-Sparrow model.
     pub distribution: Distribution,
     /// Its Fresnel reflectance, for the Torrance-Sparrow model.
@@ -119,6 +124,7 @@ impl ObjectTraits {
                 || roughness_map,
             lightmapped: lightmap.is_some() && !mesh.uv1.is_empty(),
             energy_conserving: material.lobe == Lobe::EnergyConserving,
+            metal: is_metal(material, maps),
             distribution: material.distribution,
             fresnel: material.fresnel,
             shading: shading.copied(),
@@ -147,6 +153,16 @@ impl ObjectTraits {
     pub fn is_lit_by_irradiance_volume(&self) -> bool {
         !self.lightmapped && !self.unlit
     }
+}
+
+/// Returns true if any part of a surface may be metal (see [`ObjectTraits::metal`]).
+fn is_metal(material: &Material, maps: Option<&MaterialTextures>) -> bool {
+    let reflects = |specular: Vec3| metal_reflectance(specular.as_dvec3(), 0.0) != DVec3::ZERO;
+    let by_texture = maps.and_then(|maps| maps.metallic_roughness.as_ref());
+    let sides = std::iter::once(&material.front).chain(&material.back);
+    material.lobe == Lobe::EnergyConserving
+        && (sides.map(|side| side.specular).any(reflects)
+            || by_texture.is_some_and(|slot| slot.metallic > 0.0 || reflects(slot.dielectric)))
 }
 
 /// The plane of a flat mirror in mesh space, or `None` if its reflection cannot be drawn as a view of its own

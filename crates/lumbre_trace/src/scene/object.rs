@@ -83,9 +83,9 @@ impl Object {
         low.cmplt(high).all() && own.cmpge(low).all() && own.cmple(high).all()
     }
 
-    /// Returns k_d E/π of the irradiance volume that lights it, if there is one.
-    pub fn volume_light(&self, point: DVec3, normal: DVec3, diffuse: DVec3) -> Option<DVec3> {
-        self.volume.as_ref().map(|(volume, place)| diffuse * volume.light(place, point, normal))
+    /// Returns the light of the irradiance volume that lights it, if there is one, with this reflectance.
+    pub fn volume_light(&self, point: DVec3, normal: DVec3, reflectance: DVec3) -> Option<DVec3> {
+        self.volume.as_ref().map(|(volume, place)| reflectance * volume.light(place, point, normal))
     }
 
     /// Returns true if it is a refracting solid: transmissive and not thin.
