@@ -13,7 +13,7 @@ use lumbre_optics::{
 };
 use lumbre_render::{FrameOptions, LightLists, RenderingPath};
 use lumbre_scene::{
-    AmbientCube, Camera, EmissiveLight, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
+    AmbientCube, Camera, Census, EmissiveLight, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
     MaterialTextures, Mesh, MetallicRoughnessTexture, OcclusionTexture, Projection, SceneSettings,
     StaticObject, Transform,
 };
@@ -111,6 +111,8 @@ fn checked(name: &str, difference: &Difference, least: usize) {
 #[test]
 fn every_shading_and_every_list_agrees_with_the_twin() {
     let mut world = scene();
+    // All but the plastic ball.
+    assert_eq!(Census::of(&mut world).baked_metals, 4);
     for shading in Shading::ALL {
         let expected = expected(&mut world, *shading);
         for light_lists in [LightLists::Everything, LightLists::Objects, LightLists::Clusters] {

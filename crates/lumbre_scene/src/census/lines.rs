@@ -130,6 +130,12 @@ impl Census {
             mesh("emission", self.emissive, "with emission", "no material emits"),
             mesh("lightmaps", self.lightmapped, "with a lightmap", "no mesh has a lightmap"),
             self.volumes(),
+            mesh(
+                "metals under baked light",
+                self.baked_metals,
+                "of metal in baked light, which shows by the albedo of its highlight",
+                "no metal has baked light",
+            ),
             mesh("textures", self.textured, "with a textured material", "no material has a texture"),
             mesh("base colour textures", self.base_color_textures, "with one", "no material has one"),
             mesh("emissive textures", self.emissive_textures, "with one", "no material has one"),

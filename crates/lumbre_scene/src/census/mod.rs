@@ -52,6 +52,8 @@ pub struct Census {
     pub irradiance_volumes: usize,
     /// Lit meshes without a lightmap, if there is a usable irradiance volume.
     pub lit_by_volume: usize,
+    /// Metals among the meshes lit by a lightmap or an irradiance volume.
+    pub baked_metals: usize,
     /// Meshes with a texture of any kind.
     pub textured: usize,
     /// Meshes with a base colour texture.
@@ -125,6 +127,7 @@ impl Census {
     ) -> Self {
         let [base_color, emissive, metallic_roughness, normal, occlusion] = objects.textures;
         let two_sided = |count| if settings.two_sided { count } else { 0 };
+        let by_volume = |count| if irradiance_volumes > 0 { count } else { 0 };
         let highlights = ReflectionModel::ALL
             .iter()
             .map(|model| (model.name(), objects.highlights_of(*model, settings.reflection)))
@@ -141,7 +144,8 @@ impl Census {
             dynamic_objects: objects.dynamic_objects,
             lightmapped: objects.lightmapped,
             irradiance_volumes,
-            lit_by_volume: if irradiance_volumes > 0 { objects.without_lightmap } else { 0 },
+            lit_by_volume: by_volume(objects.without_lightmap),
+            baked_metals: objects.lightmapped_metals + by_volume(objects.metals_without_lightmap),
             textured: objects.textured,
             base_color_textures: base_color,
             emissive_textures: emissive,

@@ -24,6 +24,10 @@ pub struct ObjectCensus {
     pub lightmapped_blended: usize,
     /// Lit objects without a lightmap.
     pub without_lightmap: usize,
+    /// Metals lit by a lightmap.
+    pub lightmapped_metals: usize,
+    /// Lit metals without a lightmap.
+    pub metals_without_lightmap: usize,
     /// Objects with each texture, in the order of [`MaterialTextures::slots`].
     pub textures: [usize; MaterialTextures::SLOTS],
     /// Objects with a texture of any kind.
@@ -112,6 +116,8 @@ impl ObjectCensus {
             (&mut self.lightmapped, by_lightmap),
             (&mut self.lightmapped_blended, by_lightmap && blended),
             (&mut self.without_lightmap, traits.is_lit_by_irradiance_volume()),
+            (&mut self.lightmapped_metals, by_lightmap && traits.metal),
+            (&mut self.metals_without_lightmap, traits.is_lit_by_irradiance_volume() && traits.metal),
             (&mut self.textured, traits.texture_mask != 0),
             (&mut self.vertex_colors, traits.vertex_color),
             (&mut self.alpha_mask, matches!(traits.alpha_mode, AlphaMode::Mask { .. })),
