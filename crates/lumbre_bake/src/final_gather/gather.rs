@@ -83,7 +83,7 @@ struct GatherContribution {
     texel_variance: f32,
     /// Whether the light of a texel was read, not that of a patch.
     reads_texel: bool,
-    /// Whether the patch that was read is checked against a real bounce.
+    /// Whether the patch that was read is checked against a real bounce, or none was read and this is the turn.
     is_checked: bool,
     /// By how much the patch gives more light than the real bounce; before the check has run, the weight of that.
     difference: Vec3,
@@ -164,6 +164,11 @@ impl RadianceCache<'_> {
                 weight: incident.weight,
                 ..GatherContribution::default()
             };
+            // Takes turns over replicates, samples and texels: every neighbourhood gets checks, however few samples
+            // there are. Of rays that hit nothing, too: they read no patch, and differ by nothing.
+            let turn =
+                (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.0.wrapping_mul(7));
+            contribution.is_checked = turn.is_multiple_of(CHECK_INTERVAL);
             let Some(hit) = &mut incident.hit else { continue };
             if hit.is_steep {
                 let sequence = Sequence::new(seed, Stream::SteepLight(replicate as u32), texel.index.0);
@@ -174,11 +179,6 @@ impl RadianceCache<'_> {
             let inverse_distance = incident.weight / hit.distance.max(f32::MIN_POSITIVE);
             let normal = self.scene.triangles[hit.triangle as usize].normal;
             gathered.nearness.add(Nearness::of_surface(inverse_distance, normal, &map_axes));
-            // Takes turns over replicates, samples and texels: every neighbourhood gets checks, however few samples
-            // there are.
-            let turn =
-                (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.0.wrapping_mul(7));
-            contribution.is_checked = turn.is_multiple_of(CHECK_INTERVAL);
             let receiver = &samples.requests[slot].receiver;
             let last = self.read(receiver, hit, &sequences[replicate], sample, contribution);
             if let Some(last) = last.filter(|_| contribution.is_checked) {

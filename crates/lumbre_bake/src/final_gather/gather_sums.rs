@@ -53,7 +53,8 @@ pub(crate) struct GatherSums {
     pub texel_variances: f32,
     /// Samples that read a texel instead of a patch.
     pub texel_reads: u32,
-    /// Samples whose patch was checked against a real bounce; the sum of the differences and that of their squares.
+    /// Samples whose patch was checked against a real bounce, and the share of those that hit nothing whose turn it was;
+    /// the sum of the differences and that of their squares.
     pub checks: u32,
     pub differences: Vec3,
     pub squared_differences: f32,

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::Material;
-use lumbre_scene::{Mesh, SceneSettings, StaticObject};
+use lumbre_scene::{Mesh, Name, SceneSettings, StaticObject, Transform};
 
 const SKY: Vec3 = Vec3::new(0.5, 1.0, 2.0);
 
@@ -129,6 +129,51 @@ fn the_floor_of_a_trench() {
     println!("{found}; stated {:.3} %; walls reach {long}", 100.0 * report.estimated_error);
     assert!(found.missed == 0 && found.rmse < 0.01 && found.rmse < 2.0 * report.estimated_error, "{found}");
     assert!(found.bias.abs() < 0.005, "{found}");
+}
+
+/// A figure of boxes in the open, most of whose rays meet nothing. Its maps in the order of their names.
+fn figure(reflectance: Vec3) -> Vec<Vec<DVec3>> {
+    let mut world = World::new();
+    let boxes = [
+        (Vec3::new(1.0, 1.0, 1.0), [0.0, 1.0, 0.0]),
+        (Vec3::new(0.9, 1.0, 0.6), [0.0, 0.0, 0.0]),
+        (Vec3::new(0.6, 0.7, 0.25), [0.0, 0.15, 0.43]),
+        (Vec3::new(0.1, 0.15, 0.1), [-0.35, 1.575, 0.0]),
+    ];
+    for (number, (size, [x, y, z])) in boxes.into_iter().enumerate() {
+        let mesh = Mesh(Arc::new(shapes::cuboid(size, 1)));
+        let material = crate::scene_parts::matt(reflectance, Vec3::ZERO);
+        let name = Name::new(format!("box {number}"));
+        world.spawn((name, mesh, material, StaticObject, Transform::from_xyz(x, y, z)));
+    }
+    let options = BakeOptions { density: Density::TexelsPerMeter(48.0), ..BakeOptions::default() };
+    let report = run(&mut world, &options);
+    assert!(report.error_reached, "{report}");
+    let mut maps = common::maps(&mut world);
+    maps.sort_by(|a, b| a.0.cmp(&b.0));
+    maps.iter()
+        .map(|(_, map)| map.texels.iter().map(|texel| texel.as_dvec3() / SKY.as_dvec3()).collect())
+        .collect()
+}
+
+#[test]
+fn nothing_in_the_open_is_brighter_than_the_sky_or_darker_than_among_black_things() {
+    let (black, grey) = (figure(Vec3::ZERO), figure(Vec3::new(0.2, 0.8, 0.6)));
+    let open =
+        black.iter().flatten().zip(grey.iter().flatten()).filter(|(black, _)| black.min_element() > 0.05);
+    let (beside, of_sky): (Vec<f64>, Vec<f64>) =
+        open.map(|(black, grey)| ((*grey - *black).min_element(), grey.max_element())).unzip();
+    // One texel in a thousand may lie in a corner that the maps hardly resolve.
+    let all_but_a_thousandth = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        let out = values.len() / 1000;
+        [values[out], values[values.len() - 1 - out]]
+    };
+    assert!(of_sky.len() > 10_000, "{}", of_sky.len());
+    let ([lowest, _], [_, highest]) = (all_but_a_thousandth(beside), all_but_a_thousandth(of_sky));
+    println!("at most {highest:.4} of the sky's light, at least {lowest:.4} more than among black things");
+    // Twice the error that is reached.
+    assert!(highest < 1.02 && lowest > -0.02, "{highest} {lowest}");
 }
 
 #[test]
