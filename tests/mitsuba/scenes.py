@@ -106,14 +106,7 @@ def glb(objects, path):
         return len(document["accessors"]) - 1
 
     for number, thing in enumerate(objects):
-        faces = [(thing["corner"], thing["u"], thing["v"])] if thing["shape"] == "quad" else box_faces(thing)
-        positions, normals, indices = [], [], []
-        for corner, u, v in faces:
-            corner, u, v = (np.array(value, float) for value in (corner, u, v))
-            first = len(positions)
-            positions += [corner, corner + u, corner + u + v, corner + v]
-            normals += [np.cross(u, v) / np.linalg.norm(np.cross(u, v))] * 4
-            indices += [first, first + 1, first + 2, first, first + 2, first + 3]
+        positions, normals, indices = triangles(thing)
         primitive = {
             "attributes": {
                 "POSITION": accessor(np.array(positions, np.float32), 5126, "VEC3"),
@@ -145,6 +138,21 @@ def glb(objects, path):
         file.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data)))
         file.write(struct.pack("<I4s", len(text), b"JSON") + text)
         file.write(struct.pack("<I4s", len(data), b"BIN\0") + data)
+
+
+def triangles(thing):
+    """Positions, normals and indices."""
+    if thing["shape"] == "mesh":
+        return thing["positions"], thing["normals"], thing["triangles"].ravel()
+    faces = [(thing["corner"], thing["u"], thing["v"])] if thing["shape"] == "quad" else box_faces(thing)
+    positions, normals, indices = [], [], []
+    for corner, u, v in faces:
+        corner, u, v = (np.array(value, float) for value in (corner, u, v))
+        first = len(positions)
+        positions += [corner, corner + u, corner + u + v, corner + v]
+        normals += [np.cross(u, v) / np.linalg.norm(np.cross(u, v))] * 4
+        indices += [first, first + 1, first + 2, first, first + 2, first + 3]
+    return positions, normals, indices
 
 
 def phong(material):

@@ -38,7 +38,8 @@ pub(crate) struct Target<'a> {
 }
 
 /// Returns the transmittance along a ray to its target, and the number of rays that were traced for it. `media`
-/// holds the media at the ray's start.
+/// holds the media at the ray's start. (Inlined, so that the ray is not written to memory.)
+#[inline]
 pub(crate) fn transmittance(
     scene: &Scene,
     ray: &SpaceRay,

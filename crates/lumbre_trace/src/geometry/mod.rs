@@ -4,6 +4,7 @@
 mod bounding_ball;
 mod hierarchy;
 mod occluders;
+mod owners;
 mod quadric;
 mod ray;
 

@@ -4,7 +4,8 @@
 use glam::{DVec3, Vec3A};
 use lumbre_rays::{Ray, offset_ray_origin};
 
-/// A ray in the tracer's space.
+/// A ray in the tracer's space. (What is called for every ray is inlined: a ray that is written to memory in pieces and
+/// read back in others waits for the writes.)
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpaceRay {
     /// Origin in metres, exactly on the surface that the ray leaves.
@@ -57,6 +58,7 @@ impl SpaceRay {
     }
 
     /// Creates a ray from a point of a surface with this geometric normal, to either side of it.
+    #[inline]
     pub fn leaving(origin: DVec3, direction: DVec3, geometric: DVec3, extent: f64) -> Self {
         let side = if direction.dot(geometric) < 0.0 { -geometric } else { geometric };
         Self { origin, direction, departure: Some(Departure::new(origin, side, extent)) }
@@ -69,6 +71,7 @@ impl SpaceRay {
 
     /// Returns the ray in f32 for triangles, whose corners are f32, with its origin offset from the surface
     /// that it leaves.
+    #[inline]
     pub fn for_triangles(&self, farthest: f64) -> Ray {
         let (origin, direction) = (self.start().origin.into(), self.direction.as_vec3());
         Ray { origin, direction, t_min: 0.0, t_max: farthest as f32 }
@@ -116,6 +119,7 @@ impl SpaceRay {
 }
 
 impl Departure {
+    #[inline]
     fn new(origin: DVec3, side: DVec3, extent: f64) -> Self {
         let offset = offset_ray_origin(origin.as_vec3(), side.as_vec3(), extent as f32);
         Self { side, extent, start: TriangleStart::new(origin, offset.into()) }
@@ -123,6 +127,7 @@ impl Departure {
 }
 
 impl TriangleStart {
+    #[inline]
     fn new(exact: DVec3, origin: Vec3A) -> Self {
         Self { origin, back: (exact - origin.as_dvec3()).as_vec3a() }
     }
@@ -130,6 +135,7 @@ impl TriangleStart {
 
 impl RayOrigin {
     /// Creates the origin at a point of a surface with this geometric normal and largest coordinate.
+    #[inline]
     pub fn new(position: DVec3, geometric: DVec3, extent: f64) -> Self {
         Self { position, departure: Departure::new(position, geometric, extent) }
     }
@@ -137,10 +143,10 @@ impl RayOrigin {
     /// Returns the ray in a direction, to either side of the surface.
     #[inline]
     pub fn towards(&self, direction: DVec3) -> SpaceRay {
-        let Departure { side, extent, .. } = self.departure;
-        if direction.dot(side) < 0.0 {
-            return SpaceRay::leaving(self.position, direction, side, extent);
-        }
-        SpaceRay { origin: self.position, direction, departure: Some(self.departure) }
+        let departure = match direction.dot(self.departure.side) < 0.0 {
+            true => Departure::new(self.position, -self.departure.side, self.departure.extent),
+            false => self.departure,
+        };
+        SpaceRay { origin: self.position, direction, departure: Some(departure) }
     }
 }

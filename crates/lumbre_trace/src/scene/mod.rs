@@ -75,16 +75,15 @@ impl Scene {
         let origin = if eye.length() > FAR { eye } else { DVec3::ZERO };
         let collected = collect::collect(world, origin, reflection, baked_light)?;
         let exact = |index: usize| collected.quadrics.iter().any(|(own, _)| *own == index);
-        let mut triangles = Vec::new();
-        for (index, object) in collected.objects.iter().enumerate().filter(|(index, _)| !exact(*index)) {
-            if triangles.len() + object.shape.triangle_count() > MAX_TRIANGLES {
-                let triangles = triangles.len() + object.shape.triangle_count();
-                return Err(TraceError::TooManyTriangles { triangles });
+        let (mut triangles, mut counts) = (Vec::new(), Vec::with_capacity(collected.objects.len()));
+        for (index, object) in collected.objects.iter().enumerate() {
+            let count = if exact(index) { 0 } else { object.shape.triangle_count() };
+            if triangles.len() + count > MAX_TRIANGLES {
+                return Err(TraceError::TooManyTriangles { triangles: triangles.len() + count });
             }
-            for (number, corners) in (0u32..).zip(object.shape.triangles()) {
-                triangles
-                    .push((object.corners(corners).map(|corner| corner.as_vec3()), (index as u32, number)));
-            }
+            let corners = object.shape.triangles().take(count);
+            triangles.extend(corners.map(|corners| object.corners(corners).map(|corner| corner.as_vec3())));
+            counts.push(count as u32);
         }
         let quadrics: Vec<_> = collected
             .quadrics
@@ -98,7 +97,7 @@ impl Scene {
         // Glowing objects may be bulbs, which let the light of their lamp pass.
         let always_blocks =
             |index: usize| passable[index].passage == Passage::Closed && !collected.objects[index].glows();
-        let geometry = Geometry::build(triangles, &quadrics, always_blocks);
+        let geometry = Geometry::build(&triangles, &counts, &quadrics, always_blocks);
         let is_open = |found: &Passable| matches!(found.passage, Passage::Clear | Passage::Covering);
         Ok(Self {
             see_through: passable.iter().any(is_open),
