@@ -121,3 +121,27 @@ fn checked(study: &Study, point: &Point, found: Option<Compared>) -> Result<Comp
         false => Err(CostError::NotFinite { study: study.name.clone(), point: named() }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn a_picture_is_compared_with_the_reference_that_is_kept_now() -> Result<(), CostError> {
+        let grey = |radiance: f64| Picture { width: 4, radiance: vec![DVec3::splat(radiance); 16] };
+        let mut measured = Measured::of(Study { name: "shades".into(), ..Study::default() });
+        let mut flip_of = |reference: f64, label: &str| -> Result<Option<f64>, CostError> {
+            let reference = measured.keep_reference("reference", grey(reference));
+            let point = Point { label: label.into(), ..Point::default() };
+            measured.add_picture(point, grey(0.25), &reference, ErrorOver::Picture)?;
+            Ok(measured.study.points.last().and_then(|point| point.error?.flip))
+        };
+        assert_eq!(flip_of(0.25, "itself")?, Some(0.0));
+        let other = flip_of(0.75, "another")?;
+        assert!(other.is_some_and(|flip| flip > 0.1), "{other:?}");
+        assert_eq!(flip_of(0.25, "itself again")?, Some(0.0));
+        Ok(())
+    }
+}
