@@ -58,11 +58,11 @@ impl Seen {
         let largest = color_distance(hunt_lab(DVec3::Y), hunt_lab(DVec3::Z));
         let colors = self.colors.par_iter().zip(&test.colors);
         let features = self.features.par_iter().zip(&test.features);
-        let difference = |((a, b), (edges, others)): ((&DVec3, &DVec3), (&[f64; 2], &[f64; 2]))| {
+        let pixels = colors.zip(features).map(|((a, b), (edges, others))| {
             let color = spread(color_distance(*a, *b), largest);
             color.powf(1.0 - feature_difference(edges, others))
-        };
-        colors.zip(features).map(difference).collect()
+        });
+        pixels.collect()
     }
 }
 
