@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::picture::{Compared, Picture, compared};
+use crate::picture::{Compared, Picture, ShownReference, compared_with};
 use crate::{CostError, ErrorOf, ErrorOver, KeptMaps, Point, PointPicture, Study};
 
 /// A finished study.
@@ -14,14 +14,27 @@ pub struct Measured {
     pub pictures: BTreeMap<String, Picture>,
     /// FLIP of every pixel against the reference, by the name of the picture.
     pub heat: BTreeMap<String, Vec<f64>>,
+    /// The reference of the last comparison with its name. Points with the same reference mostly follow each other.
+    shown: Option<(String, ShownReference)>,
 }
 
 impl Measured {
+    /// Begins the results of a study.
+    pub fn of(study: Study) -> Self {
+        Self { study, ..Self::default() }
+    }
+
     /// Keeps a reference picture, and returns the name by which points refer to it.
     pub fn keep_reference(&mut self, name: &str, picture: Picture) -> String {
         let name = self.file_name(name);
-        self.pictures.insert(name.clone(), picture);
+        self.keep(name.clone(), picture);
         name
+    }
+
+    fn keep(&mut self, name: String, picture: Picture) {
+        // What was known of another picture of this name is out of date.
+        self.shown.take_if(|(known, _)| *known == name);
+        self.pictures.insert(name, picture);
     }
 
     /// Adds a point with its picture. Its error is computed from the picture and a kept reference, unless
@@ -45,7 +58,7 @@ impl Measured {
             (_, own) => ErrorOf { uncertainty: own.map_or(0.0, |own| own.uncertainty), ..found.error },
         };
         self.study.points.push(Point { error: Some(error), picture: Some(files), ..point });
-        self.pictures.insert(name.clone(), picture);
+        self.keep(name.clone(), picture);
         self.heat.insert(name, found.heat);
         Ok(())
     }
@@ -62,21 +75,26 @@ impl Measured {
         (maps, maps_of_reference): (Picture, &str),
     ) -> Result<(), CostError> {
         let name = self.file_name(&format!("{} {} maps", point.series, point.label));
-        self.pictures.insert(name.clone(), maps);
+        self.keep(name.clone(), maps);
         let kept = KeptMaps { picture: name, reference: maps_of_reference.to_owned() };
         let files = PointPicture { maps: Some(kept), ..PointPicture::default() };
         self.add_picture(Point { picture: Some(files), ..point }, frame, reference, ErrorOver::Beyond)
     }
 
     fn compared(
-        &self,
+        &mut self,
         point: &Point,
         picture: &Picture,
         reference: &str,
         over: ErrorOver,
     ) -> Result<Compared, CostError> {
-        let wanted = self.pictures.get(reference);
-        checked(&self.study, point, wanted.and_then(|wanted| compared(wanted, picture, over)))
+        let found = self.pictures.get(reference).and_then(|wanted| {
+            let known = self.shown.take().filter(|(name, _)| name == reference);
+            let shown = known.unwrap_or_else(|| (reference.to_owned(), ShownReference::of(wanted)));
+            let (_, shown) = self.shown.insert(shown);
+            compared_with((wanted, shown), picture, over)
+        });
+        checked(&self.study, point, found)
     }
 
     /// Returns the path of a picture below `pictures/STUDY`, reduced to letters, digits and hyphens.
@@ -101,5 +119,29 @@ fn checked(study: &Study, point: &Point, found: Option<Compared>) -> Result<Comp
     match found.error.relative_rmse.is_finite() && found.error.largest.is_finite() {
         true => Ok(found),
         false => Err(CostError::NotFinite { study: study.name.clone(), point: named() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn a_picture_is_compared_with_the_reference_that_is_kept_now() -> Result<(), CostError> {
+        let grey = |radiance: f64| Picture { width: 4, radiance: vec![DVec3::splat(radiance); 16] };
+        let mut measured = Measured::of(Study { name: "shades".into(), ..Study::default() });
+        let mut flip_of = |reference: f64, label: &str| -> Result<Option<f64>, CostError> {
+            let reference = measured.keep_reference("reference", grey(reference));
+            let point = Point { label: label.into(), ..Point::default() };
+            measured.add_picture(point, grey(0.25), &reference, ErrorOver::Picture)?;
+            Ok(measured.study.points.last().and_then(|point| point.error?.flip))
+        };
+        assert_eq!(flip_of(0.25, "itself")?, Some(0.0));
+        let other = flip_of(0.75, "another")?;
+        assert!(other.is_some_and(|flip| flip > 0.1), "{other:?}");
+        assert_eq!(flip_of(0.25, "itself again")?, Some(0.0));
+        Ok(())
     }
 }

@@ -1,7 +1,8 @@
 //! Pictures of radiance, and their comparison with references.
 
 use glam::DVec3;
-use lumbre_trace::{Metering, compare, shown};
+use lumbre_trace::{Displayed, Metering, compare_displayed, shown};
+use rayon::prelude::*;
 
 use crate::{ErrorOf, ErrorOver};
 
@@ -41,14 +42,33 @@ impl Picture {
     /// Returns the displayed colours with an exposure: tone curve and sRGB encoding, with each channel in [0,
     /// 1].
     pub fn shown(&self, exposure: f64) -> Vec<DVec3> {
-        self.radiance.iter().map(|pixel| shown(*pixel * exposure)).collect()
+        self.radiance.par_iter().map(|pixel| shown(*pixel * exposure)).collect()
+    }
+}
+
+/// A reference as it is displayed, for any number of comparisons.
+#[derive(Clone, Debug)]
+pub struct ShownReference {
+    exposure: f64,
+    displayed: Displayed,
+}
+
+impl ShownReference {
+    /// Displays a reference with this exposure.
+    pub fn at(reference: &Picture, exposure: f64) -> Self {
+        Self { exposure, displayed: Displayed::new(reference.width, reference.shown(exposure)) }
+    }
+
+    /// Displays a reference with its own exposure.
+    pub fn of(reference: &Picture) -> Self {
+        Self::at(reference, reference.exposure())
     }
 }
 
 /// Compares a picture with its reference, both displayed with the reference's exposure. `None` if the sizes
 /// differ.
 pub fn compared(reference: &Picture, picture: &Picture, over: ErrorOver) -> Option<Compared> {
-    compared_at(reference, picture, over, reference.exposure())
+    compared_with((reference, &ShownReference::of(reference)), picture, over)
 }
 
 /// Compares a picture with its reference, both displayed with this exposure. `None` if the sizes differ.
@@ -57,6 +77,15 @@ pub fn compared_at(
     picture: &Picture,
     over: ErrorOver,
     exposure: f64,
+) -> Option<Compared> {
+    compared_with((reference, &ShownReference::at(reference, exposure)), picture, over)
+}
+
+/// Compares a picture with a reference that is displayed already. `None` if the sizes differ.
+pub fn compared_with(
+    (reference, shown): (&Picture, &ShownReference),
+    picture: &Picture,
+    over: ErrorOver,
 ) -> Option<Compared> {
     let same = reference.width == picture.width && reference.radiance.len() == picture.radiance.len();
     if !same || picture.radiance.is_empty() {
@@ -67,8 +96,10 @@ pub fn compared_at(
         over != ErrorOver::WhereBothAreLit || (**a != DVec3::ZERO && **b != DVec3::ZERO)
     };
     let (wanted, found): (Vec<DVec3>, Vec<DVec3>) = pairs.filter(counts).map(|(a, b)| (*a, *b)).unzip();
-    let both_shown = [reference.shown(exposure), picture.shown(exposure)];
-    let found = compare(reference.width, [&wanted, &found], both_shown);
+    // A picture that is the reference itself looks the same.
+    let own = (reference != picture).then(|| Displayed::new(picture.width, picture.shown(shown.exposure)));
+    let found =
+        compare_displayed([&wanted, &found], [&shown.displayed, own.as_ref().unwrap_or(&shown.displayed)]);
     let error = ErrorOf {
         relative_rmse: found.relative_error,
         largest: found.largest,

@@ -4,7 +4,7 @@
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::flip;
+use crate::flip::{PIXELS_PER_DEGREE, Picture, Seen};
 
 /// The difference between a picture and a reference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -26,11 +26,34 @@ pub struct Comparison {
     pub map: Vec<f64>,
 }
 
+/// A picture as displayed in sRGB, in [0, 1], with what the eye makes of it. A reference that many pictures are
+/// compared with is looked at once.
+#[derive(Clone, Debug)]
+pub struct Displayed {
+    picture: Picture,
+    seen: Seen,
+}
+
+impl Displayed {
+    /// Looks at a picture of this width, top row first.
+    pub fn new(width: usize, pixels: Vec<DVec3>) -> Self {
+        let picture = Picture { width, pixels };
+        Self { seen: Seen::of(&picture, PIXELS_PER_DEGREE), picture }
+    }
+}
+
 /// Compares two pictures of the same size, given as linear radiance (`linear`) and as displayed in sRGB, in
 /// [0, 1] (`shown`); each array holds the reference first.
 ///
 /// A pixel with a channel that is not finite in either picture counts as infinitely different.
 pub fn compare(width: usize, linear: [&[DVec3]; 2], shown: [Vec<DVec3>; 2]) -> Comparison {
+    let [reference, test] = shown.map(|pixels| Displayed::new(width, pixels));
+    compare_displayed(linear, [&reference, &test])
+}
+
+/// Does what [`compare`] does, with pictures that have been looked at.
+pub fn compare_displayed(linear: [&[DVec3]; 2], shown: [&Displayed; 2]) -> Comparison {
+    let width = shown[0].picture.width;
     let [reference, test] = linear;
     let (mut sum, mut brightness) = (0.0, 0.0);
     let (mut largest, mut at) = (0.0, 0);
@@ -43,10 +66,10 @@ pub fn compare(width: usize, linear: [&[DVec3]; 2], shown: [Vec<DVec3>; 2]) -> C
         sum += apart.element_sum();
         brightness += wanted.element_sum();
     }
-    let noise: f64 = shown[0].iter().zip(&shown[1]).map(|(a, b)| (*a - *b).length_squared()).sum();
-    let mean = noise / (3 * shown[0].len().max(1)) as f64;
-    let [reference, test] = shown.map(|pixels| flip::Picture { width, pixels });
-    let map = flip::flip(&reference, &test, flip::PIXELS_PER_DEGREE);
+    let [wanted, found] = shown.map(|displayed| &displayed.picture.pixels);
+    let noise: f64 = wanted.iter().zip(found).map(|(a, b)| (*a - *b).length_squared()).sum();
+    let mean = noise / (3 * wanted.len().max(1)) as f64;
+    let map = shown[0].seen.differences(&shown[1].seen);
     Comparison {
         relative_error: relative_error(linear[0], linear[1]),
         relative_bias: over(sum, brightness),

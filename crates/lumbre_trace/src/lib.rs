@@ -90,7 +90,7 @@ pub use aov::{Aov, AovPicture, AovValues, LightPart};
 pub use branch::{Branch, BranchLamp, BranchLight, BranchPoint, Kind};
 pub use branch_drawing::TreeFormat;
 pub use checkpoint::{Continuation, Keep};
-pub use comparison::{Comparison, compare, relative_error};
+pub use comparison::{Comparison, Displayed, compare, compare_displayed, relative_error};
 pub use display::shown;
 pub use error::{CheckpointError, TraceError};
 pub use filter::Filter;

@@ -2,6 +2,7 @@
 //! which error they state, and which error they have, compared with a converged bake of the same texels.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use lumbre_bake::{BakeOptions, Quality};
 use lumbre_render::FrameOptions;
@@ -26,8 +27,13 @@ const FEW_ERRORS: &[f64] = &[0.08, 0.03];
 /// The error requested from the bakes of other studies, in a full and in a quick report.
 pub(super) const ERROR: f64 = 0.02;
 pub(super) const QUICK_ERROR: f64 = 0.06;
-/// Time limit of the converged bake in a quick report, the same as in other studies, so that they share it.
-pub(super) const REFERENCE_SECONDS: f64 = 1.5;
+/// Approximate number of texels of a room, in a full and in a quick report, the same as in other studies, so that they
+/// share bakes and the converged bake.
+const TEXELS: f64 = 2_500.0;
+const FEW_TEXELS: f64 = 700.0;
+/// Time limits of the converged bake, in a full and in a quick report.
+const REFERENCE_SECONDS: f64 = 12.0;
+const QUICK_REFERENCE_SECONDS: f64 = 1.5;
 /// The same where each bake takes seconds, of which this one would otherwise have none left for its rays.
 const SECONDS_OF_MANY_TRIANGLES: f64 = 6.0;
 /// Sides of patches in texels; the default of this quality is 4.
@@ -42,9 +48,19 @@ const STATED: &str = "error stated, % of the mean";
 const STATED_AT_MOST: &str = "error stated, whole or in the worst view, %";
 const FOUND: &str = "error found, % of the mean";
 
-/// The time limit of the converged bake in a quick report, which may make few bakes because each takes seconds.
-pub(super) fn reference_seconds(few: bool) -> f64 {
-    if few { SECONDS_OF_MANY_TRIANGLES } else { REFERENCE_SECONDS }
+/// The time limit of a converged bake in a quick report, which may make few bakes because each takes seconds.
+pub(super) fn quick_reference_seconds(few: bool) -> f64 {
+    if few { SECONDS_OF_MANY_TRIANGLES } else { QUICK_REFERENCE_SECONDS }
+}
+
+/// The number of texels of a bake that studies share.
+pub(super) fn texels_of_room(conditions: &Conditions<'_>) -> f64 {
+    conditions.unless_quick(TEXELS, FEW_TEXELS)
+}
+
+/// The time limit of the converged bake with these texels.
+pub(super) fn reference_time(conditions: &Conditions<'_>, few: bool) -> Duration {
+    conditions.reference_time(REFERENCE_SECONDS, quick_reference_seconds(few))
 }
 
 /// Runs the study.
@@ -160,10 +176,9 @@ fn of_scene(
     measured.study.notes.extend(few.iter().map(|why| {
         format!("{why} It bakes for one error only, each bake once, and not with other patches or without smoothing.")
     }));
-    let options = bake_options(conditions, scene, conditions.unless_quick(2_500.0, 700.0))?;
+    let options = bake_options(conditions, scene, texels_of_room(conditions))?;
     let part = |share: f64| before + share * (after - before);
-    let options_of_truth =
-        converged(conditions, &options, conditions.reference_time(12.0, reference_seconds(few.is_some())));
+    let options_of_truth = converged(conditions, &options, reference_time(conditions, few.is_some()));
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.0), part(0.4)])?;
     measured.study.notes.push(format!(
         "The converged bake of the {} took {:.0} s and states an error of {} of its mean.",

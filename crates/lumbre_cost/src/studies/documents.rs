@@ -9,7 +9,7 @@ use lumbre_bake::{BakeOptions, BakeReport};
 use lumbre_optics::{Lobe, ReflectionModel, Shading};
 use lumbre_render::FrameOptions;
 
-use super::bake::{ERROR, QUICK_ERROR, REFERENCE_SECONDS};
+use super::bake::{ERROR, QUICK_ERROR, reference_time, texels_of_room};
 use super::shading::series_of;
 use crate::all_pairs::CubeOfPatches;
 use crate::baked::{Baked, bake_arguments, bake_options, bake_scene, maps_of, picture_of_maps, texel_error};
@@ -44,9 +44,6 @@ const OFF: &str = "farthest sum of form factors from 1, %";
 /// Sides of the baker's patches in texels, coarse to fine.
 const PATCHES: &[f32] = &[16.0, 4.0, 2.0, 1.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];
-/// Approximate number of texels of the bakes.
-const TEXELS: f64 = 2_500.0;
-const FEW_TEXELS: f64 = 700.0;
 const PAIRS: &str = "form factors of all pairs";
 const BAKES: &str = "bakes by size of patches";
 const BAKE: &str = "radiosity";
@@ -60,7 +57,7 @@ const SECONDS: f64 = 12.0;
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    let mut measured = Measured { study: study(), ..Measured::default() };
+    let mut measured = Measured::of(study());
     if !conditions.files.is_empty() {
         let note = "The scene files were not used: this study always measures scenes of its own.";
         measured.study.notes.push(note.into());
@@ -280,7 +277,7 @@ fn of_radiosity(
     let scene = SceneFile::made(conditions, "room", room(Air::Clear))?;
     let options = BakeOptions {
         error: conditions.unless_quick(ERROR, QUICK_ERROR),
-        ..bake_options(conditions, &scene, conditions.unless_quick(TEXELS, FEW_TEXELS))?
+        ..bake_options(conditions, &scene, texels_of_room(conditions))?
     };
     let by_patch = |&texels: &f32| Work {
         series: BAKES,
@@ -293,7 +290,7 @@ fn of_radiosity(
     let all: Vec<Work> = [usual, picture].into_iter().chain(patches.iter().map(by_patch)).collect();
     let part = |share: f64| before + share * (after - before);
     // The study of bakes has the same reference.
-    let time = conditions.reference_time(12.0, REFERENCE_SECONDS);
+    let time = reference_time(conditions, false);
     let truth =
         converged_bake(conditions, &scene, &converged(conditions, &options, time), [part(0.0), part(0.3)])?;
     let done = repeated(all.len(), conditions.repetitions(), |place, told| {

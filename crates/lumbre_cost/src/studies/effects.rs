@@ -32,7 +32,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
     // smaller.
     let size = [conditions.size.0, conditions.size.1].map(|side| (2 * side / 3).max(8));
     let conditions = &Conditions { size: (size[0], size[1]), ..*conditions };
-    let mut measured = Measured { study: study(), ..Measured::default() };
+    let mut measured = Measured::of(study());
     let scenes = match conditions.files.is_empty() {
         true => vec![of_its_own(conditions)?],
         false => SceneFile::given(conditions)?,

@@ -48,7 +48,7 @@ const ROUNDING: f64 = 6e-5;
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    let mut measured = Measured { study: study(), ..Measured::default() };
+    let mut measured = Measured::of(study());
     if !conditions.files.is_empty() {
         of_files(conditions, &mut measured)?;
         return Ok(measured);

@@ -11,7 +11,7 @@ use lumbre_render::FrameOptions;
 use lumbre_scene::DynamicObject;
 use lumbre_trace::{Integrator, TraceOptions};
 
-use super::bake::{ERROR, QUICK_ERROR};
+use super::bake::{ERROR, QUICK_ERROR, texels_of_room};
 use super::over_scenes;
 use crate::bake_once::bake_once;
 use crate::baked::{bake_arguments, bake_options, bake_world, few_bakes, nothing_to_bake_in};
@@ -225,7 +225,7 @@ fn steps(
     let moves = world.query_filtered::<(), With<DynamicObject>>().iter(&world).next().is_some();
     let is_lit_by_unbaked =
         bake_every_lamp(&mut world) && nothing_to_bake_in(&mut world, &scene.name).is_none();
-    let bake = bake_options(conditions, scene, conditions.unless_quick(4_000.0, 700.0))?;
+    let bake = bake_options(conditions, scene, texels_of_room(conditions))?;
     let bake = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..bake };
     let probed = BakeOptions { probes: Probes::Automatic, ..bake };
     let few = few_bakes(conditions, scene)?.filter(|_| is_lit_by_unbaked);

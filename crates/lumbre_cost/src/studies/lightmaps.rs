@@ -9,7 +9,7 @@ use lumbre_render::{FrameOptions, LightmapMemory};
 use lumbre_scene::{FrameSettings, LightmapEncoding, SceneSettings, reduce_lightmaps, shown_lightmaps};
 use lumbre_trace::relative_error;
 
-use super::bake::{ERROR, QUICK_ERROR, reference_seconds};
+use super::bake::{ERROR, QUICK_ERROR, quick_reference_seconds};
 use super::over_scenes;
 use crate::bake_once::bake_once;
 use crate::baked::{bake_arguments, bake_options, few_bakes, nothing_to_bake};
@@ -120,7 +120,7 @@ fn of_scene(
         let (world, report) = (Arc::new(Mutex::new(baked.world)), baked.report);
         all.push(Maps { world, report, options, density, reduction });
     }
-    let time = conditions.reference_time(8.0, reference_seconds(has_few));
+    let time = conditions.reference_time(8.0, quick_reference_seconds(has_few));
     let options_of_truth = converged(conditions, &BakeOptions { error, ..options }, time);
     let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.3), part(0.6)])?;
     let noise = truth.report.error_of_mean;

@@ -70,13 +70,13 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind {
         name: "preprocessing",
         about: "interreflected light, baked before the game",
-        method: 3,
+        method: 4,
         run: preprocessing::run,
     },
     StudyKind {
         name: "transport",
         about: "frames compared with all light by path tracing",
-        method: 3,
+        method: 4,
         run: light_transport::run,
     },
     StudyKind {
@@ -128,7 +128,7 @@ fn over_scenes_made(
         true => vec![SceneFile::made(conditions, name, make())?],
         false => SceneFile::given(conditions)?,
     };
-    let mut measured = Measured { study, ..Measured::default() };
+    let mut measured = Measured::of(study);
     let count = scenes.len() as f64;
     for (place, scene) in scenes.iter().enumerate() {
         of_scene(scene, [place, place + 1].map(|place| place as f64 / count), &mut measured)?;

@@ -48,7 +48,7 @@ const LOST: &str = "pixels without a number, %";
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    let mut measured = Measured { study: study(), ..Measured::default() };
+    let mut measured = Measured::of(study());
     if !conditions.files.is_empty() {
         measured
             .study

@@ -12,7 +12,7 @@ use lumbre_scene::{
     hidden_entities,
 };
 
-use super::bake::{ERROR, QUICK_ERROR, reference_seconds};
+use super::bake::{ERROR, QUICK_ERROR, quick_reference_seconds, reference_time, texels_of_room};
 use super::over_scenes;
 use crate::bake_once::keep_bake;
 use crate::baked::{
@@ -106,11 +106,12 @@ fn of_scene(
             percent(ERROR)
         )
     }));
-    let options = options_of(conditions, scene, 1.0)?;
-    let options = BakeOptions { error: conditions.unless_quick(ERROR, QUICK_ERROR), ..options };
+    let options = BakeOptions {
+        error: conditions.unless_quick(ERROR, QUICK_ERROR),
+        ..bake_options(conditions, scene, texels_of_room(conditions))?
+    };
     // The converged bake does not depend on the requested error.
-    let time = conditions.reference_time(8.0, reference_seconds(has_few));
-    let options_of_truth = converged(conditions, &options, time);
+    let options_of_truth = converged(conditions, &options, reference_time(conditions, has_few));
     let (mut baked, samples) =
         bake_world(conditions, scene.open(conditions.aspect())?, &options, None, [part(0.0), part(0.1)])?;
     keep_bake(conditions, scene, &options, &mut baked);
@@ -142,7 +143,7 @@ fn of_scene(
     }
 }
 
-/// Returns the options of bakes for a level that is this many times as large as one room. With a larger error
+/// Returns the options of bakes before and after a change, for a level that is this many times as large as one room. With a larger error
 /// there would hardly be any rays that reusing a former bake could save.
 fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Result<BakeOptions, CostError> {
     let texels = rooms * conditions.unless_quick(4_000.0, 700.0);
@@ -184,7 +185,7 @@ fn after_a_change(
         Ok(world)
     };
     let first = measured.study.points.len();
-    let time = conditions.reference_time(8.0, reference_seconds(has_few));
+    let time = conditions.reference_time(8.0, quick_reference_seconds(has_few));
     let options_of_truth = converged(conditions, options, time);
     let (mut truth, _) = bake_world(conditions, changed()?, &options_of_truth, None, [part(0.1), part(0.4)])?;
     let drawn = draw_picture(conditions, &mut truth.world, &FrameOptions::default())?;

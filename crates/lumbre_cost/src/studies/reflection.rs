@@ -58,7 +58,7 @@ const SECONDS: f64 = 14.0;
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    let mut measured = Measured { study: study(), ..Measured::default() };
+    let mut measured = Measured::of(study());
     if !conditions.files.is_empty() {
         measured
             .study

@@ -27,7 +27,7 @@ const DEPTH: &str = "depth of subdivision";
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
     let subjects = if conditions.files.is_empty() { spheres(conditions)? } else { given(conditions)? };
     let whole = !conditions.files.is_empty();
-    let mut measured = Measured { study: study(whole), ..Measured::default() };
+    let mut measured = Measured::of(study(whole));
     let mut frames = Vec::new();
     for subject in &subjects {
         for &shading in Shading::ALL {

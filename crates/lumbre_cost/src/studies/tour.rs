@@ -6,7 +6,7 @@ use bevy_ecs::prelude::*;
 use lumbre_optics::{Light, LightKind, Shading};
 use lumbre_render::FrameOptions;
 use lumbre_scene::{Camera, FrameSettings, Name, SceneSettings};
-use lumbre_trace::TraceOptions;
+use lumbre_trace::{TraceOptions, relative_error};
 
 use super::over_scenes_made;
 use crate::command_line::quoted;
@@ -14,7 +14,6 @@ use crate::findings::{milliseconds, percent};
 use crate::frame::Frame;
 use crate::frames::draw_frames;
 use crate::measured::Measured;
-use crate::picture::compared;
 use crate::scene_file::SceneFile;
 use crate::scenes::mirror_and_glass;
 use crate::traced::{ray_tree, traced_world};
@@ -192,7 +191,7 @@ fn of_camera(
     let (exact, rough) = (exact(SAMPLES)?, exact(SAMPLES / 4)?);
     // Were the samples random, the variance of the difference would be three times that of the mean of all
     // samples. Evenly spread ones are better than that.
-    let differ = compared(&exact, &rough, ErrorOver::Picture).map_or(0.0, |found| found.error.relative_rmse);
+    let differ = relative_error(&exact.radiance, &rough.radiance);
     let uncertainty = differ / f64::sqrt(3.0);
     let reference = measured.keep_reference(&format!("{} {stop} by rays", scene.name), exact);
     let middle = before + 0.3 * (after - before);

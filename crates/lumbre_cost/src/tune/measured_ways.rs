@@ -56,7 +56,7 @@ impl<'a> MeasuredWays<'a> {
         reference: DrawSettings,
         study: Study,
     ) -> Self {
-        let pictures = Measured { study, ..Measured::default() };
+        let pictures = Measured::of(study);
         Self { conditions, scene, reference, worlds: BTreeMap::new(), ways: Vec::new(), pictures }
     }
 
@@ -120,10 +120,11 @@ impl<'a> MeasuredWays<'a> {
         drawn: DrawnFrame,
     ) -> Result<(), CostError> {
         let name = &cameras.all[camera].1;
-        let reference = self.pictures.file_name(&format!("reference {camera} {name}"));
-        if *way == self.reference {
-            self.pictures.pictures.insert(reference.clone(), drawn.picture.clone());
-        }
+        let reference = format!("reference {camera} {name}");
+        let reference = match *way == self.reference {
+            true => self.pictures.keep_reference(&reference, drawn.picture.clone()),
+            false => self.pictures.file_name(&reference),
+        };
         let known = match self.ways.iter().position(|known| known.settings == *way) {
             Some(known) => known,
             None => {

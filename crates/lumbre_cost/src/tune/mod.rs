@@ -106,7 +106,8 @@ pub fn tune(
     tuned.study.seconds = begun.elapsed().as_secs_f64();
     if let Some(folder) = report {
         let folder = Folder::open(folder)?;
-        let measured = Measured { study: tuned.study.clone(), ..std::mem::take(&mut tuned.pictures) };
+        let mut measured = std::mem::take(&mut tuned.pictures);
+        measured.study = tuned.study.clone();
         folder.write_pictures(&measured)?;
         let files = vec![options.file.display().to_string()];
         let settings =

@@ -6,6 +6,7 @@
 mod changed;
 mod counts;
 mod documents;
+mod few_bakes;
 mod kept_pictures;
 mod live;
 mod planted;
