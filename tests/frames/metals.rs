@@ -2,14 +2,17 @@
 //! shading, with any lists and on either path; the highlights of baked lamps are not counted twice; under even light
 //! a metal is as bright as paths say.
 
+#![allow(clippy::print_stdout, reason = "the differences are what a reader of the output wants")]
+
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::{DVec3, UVec3, Vec2, Vec3};
+use glam::{DVec3, UVec3, Vec2, Vec3, Vec4};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{
-    BakeMode, Light, Lobe, Material, ReflectionModel, Shading, SpotCone, SurfaceSample, lobe_albedo,
+    BakeMode, ErrorBound, Light, Lobe, Material, ReflectionModel, Shading, SpotCone, SurfaceSample,
+    lobe_albedo,
 };
 use lumbre_render::{FrameOptions, LightLists, RenderingPath};
 use lumbre_scene::{
@@ -136,9 +139,64 @@ fn every_shading_and_every_list_agrees_with_the_twin() {
     let alone = expected(&mut world, Shading::Phong);
     let frame = got(&mut world, &options);
     checked("no lamps", &compare(&frame, &alone), 1500);
+    let bare = {
+        let mut looks = world.query::<&mut Material>();
+        looks.iter_mut(&mut world).for_each(|mut look| look.lobe = Lobe::Bare);
+        let bare = got(&mut world, &options);
+        looks.iter_mut(&mut world).for_each(|mut look| look.lobe = Lobe::EnergyConserving);
+        bare
+    };
     // Negative control: with bare lobes the metals are black.
-    world.query::<&mut Material>().iter_mut(&mut world).for_each(|mut look| look.lobe = Lobe::Bare);
-    assert!(compare(&got(&mut world, &options), &alone).largest > 0.3);
+    assert!(compare(&bare, &alone).largest > 0.3);
+    // In a volume instead, with an occlusion texture.
+    let objects: Vec<Entity> = world.query_filtered::<Entity, With<Lightmap>>().iter(&world).collect();
+    for object in &objects {
+        let occlusion = OcclusionTexture { texture: sharp(&image(1, &[[120; 4]])), strength: 0.9 };
+        let textures = MaterialTextures { occlusion: Some(occlusion), ..MaterialTextures::default() };
+        world.entity_mut(*object).remove::<Lightmap>().insert(textures);
+    }
+    let sides = [0.3, 0.5, 0.9, 0.6, 0.8, 0.4].map(Vec3::splat);
+    let volume =
+        IrradianceVolume { resolution: UVec3::ONE, cubes: vec![AmbientCube(sides)], inside: Vec::new() };
+    world.spawn((volume, Transform::from_scale(8.0)));
+    for lit in [false, true] {
+        if lit {
+            let lamp = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
+            world.spawn((lamp, Transform::from_xyz(1.0, 1.5, 3.0)));
+        }
+        for shading in Shading::ALL {
+            let in_volume = expected(&mut world, *shading);
+            let options = FrameOptions { shading: Some(*shading), ..linear() };
+            let name = format!("{} in a volume", shading.name());
+            checked(&name, &compare(&got(&mut world, &options), &in_volume), 400);
+        }
+    }
+    // A back with its own material, of which it shows most.
+    let mut looks = world.query_filtered::<&mut Material, With<StaticObject>>();
+    for mut look in looks.iter_mut(&mut world).filter(|look| look.double_sided) {
+        look.back = Some(metal(Vec3::new(0.2, 0.5, 0.9), 1.0, 0.9).front);
+    }
+    for shading in Shading::ALL {
+        let behind = expected(&mut world, *shading);
+        let options = FrameOptions { shading: Some(*shading), ..linear() };
+        checked("own back", &compare(&got(&mut world, &options), &behind), 400);
+    }
+}
+
+#[test]
+fn shading_by_need_keeps_its_bound() {
+    let mut world = scene();
+    let mut with = |shading| got(&mut world, &FrameOptions { shading: Some(shading), ..linear() });
+    let phong = with(Shading::Phong);
+    let mut largest = 0.0;
+    for max_error in [0.003, 0.03, 0.3, 1.0] {
+        let difference =
+            compare(&with(Shading::Auto { max_error: ErrorBound::new(max_error).unwrap() }), &phong);
+        println!("{max_error}: {:.1e}", difference.largest);
+        assert!(difference.largest <= f64::from(max_error) + 1e-5, "{max_error}: {difference:?}");
+        largest = difference.largest;
+    }
+    assert!(largest > 1e-3, "nothing was shaded more cheaply");
 }
 
 /// A metal pane that fills the frame, with a lightmap of one texel.
@@ -234,6 +292,62 @@ fn textures_say_where_there_is_metal_as_rays_find_it() {
         }
     }
     assert!(compare(&frame, &traced(&mut world)).largest > 0.1);
+}
+
+#[test]
+fn textured_metal_is_the_same_in_every_shading() {
+    // Under a distant light a pane has the same colour everywhere, however it is shaded.
+    let from_lamp = Vec3::splat(0.6);
+    let of = |shading: Shading, colors: bool| {
+        let mut world = pane(metal(Vec3::ONE, 1.0, 0.7), from_lamp + Vec3::splat(0.5));
+        let object = world.query_filtered::<Entity, With<Lightmap>>().single(&world).unwrap();
+        if colors {
+            let mut mesh = world.get_mut::<Mesh>(object).unwrap();
+            let mesh = Arc::make_mut(&mut mesh.0);
+            mesh.colors = vec![Vec4::new(0.2, 0.4, 0.6, 1.0); mesh.positions.len()];
+        } else {
+            let slot = MetallicRoughnessTexture {
+                texture: sharp(&image(1, &[[255; 4]])),
+                base_color: Vec3::ONE,
+                metallic: 1.0,
+                roughness: 0.7,
+                dielectric: Vec3::splat(0.04),
+            };
+            world.entity_mut(object).insert(MaterialTextures {
+                base_color: Some(sharp(&image(1, &[[120, 180, 220, 255]]))),
+                metallic_roughness: Some(slot),
+                ..MaterialTextures::default()
+            });
+        }
+        let sun =
+            Light { bake: BakeMode::Static, specular: Vec3::splat(1e-6), ..Light::directional(from_lamp) };
+        world.spawn((sun, Transform::from_xyz(0.0, 0.0, 5.0).looking_at(DVec3::ZERO, DVec3::Y)));
+        let options = FrameOptions { shading: Some(shading), ..linear() };
+        got(&mut world, &options)[SIZE * SIZE / 2 + SIZE / 2].unwrap()
+    };
+    for colors in [false, true] {
+        let [flat, gouraud, phong] =
+            [Shading::Flat, Shading::Gouraud, Shading::Phong].map(|shading| of(shading, colors));
+        println!("{flat} {gouraud} {phong}");
+        // What the sun does not bring, in the colour of the metal.
+        assert!(phong.x > 0.01 && phong.z > 1.5 * phong.x, "{phong}");
+        for other in [flat, gouraud] {
+            assert!((other - phong).abs().max_element() < 1e-3, "{other} {phong}");
+        }
+    }
+}
+
+#[test]
+fn what_mirrors_or_transmits_light_is_no_metal() {
+    let mirror = Material { mirror: Vec3::splat(0.5), ..metal(Vec3::ONE, 1.0, 0.3) };
+    let glass = Material { transmission: Vec3::splat(0.5), ..metal(Vec3::ONE, 1.0, 0.3) };
+    for look in [mirror, glass] {
+        let mut world = pane(look, Vec3::ONE);
+        assert_eq!(Census::of(&mut world).baked_metals, 0);
+        let options = FrameOptions { refraction: false, ..linear() };
+        let seen = got(&mut world, &options)[SIZE * SIZE / 2 + SIZE / 2].unwrap();
+        assert_eq!(seen, DVec3::ZERO);
+    }
 }
 
 /// A metal ball in even light, by a volume, seen from afar.

@@ -118,6 +118,7 @@ fn energy_conserving() -> [Twin; 4] {
 }
 
 fn metals() -> [Twin; 2] {
+    let arguments = [Type::Vector, Type::Vector, Type::Number];
     [
         Twin::new("metal_reflectance", "lobe_albedo", &[], &[Type::Number], Type::Number)
             .expect(|x| lobe_albedo(x[0]))
@@ -125,11 +126,17 @@ fn metals() -> [Twin; 2] {
             .random(|s| vec![s.decades(-3.0, 6.0)])
             .corners(product(&[&[&EXPONENTS[..], &[-1.0]].concat()]))
             .range(0.4, 1.0),
-        Twin::new("metal_reflectance", "metal_reflectance", &[], &[Type::Vector, Type::Number], Type::Vector)
-            .expect(|x| metal_reflectance(vector(x, 0), x[3]))
-            .within(|x| bound::metal_reflectance(vector(x, 0), x[3]))
-            .random(|s| vec![s.next(), s.next(), s.next(), s.decades(-3.0, 6.0)])
-            .corners(crossed(&product(&[&[0.0, 0.04], &[0.5], &[1.0, 1000.0]]), &product(&[&EXPONENTS[..]]))),
+        Twin::new("metal_reflectance", "metal_reflectance", &[], &arguments, Type::Vector)
+            .expect(|x| metal_reflectance(vector(x, 0), vector(x, 3), x[6]))
+            .within(|x| bound::metal_reflectance(vector(x, 3), x[6]))
+            .random(|s| {
+                let unit: Vec<f32> = (0..6).map(|_| s.next()).collect();
+                [unit, vec![s.decades(-3.0, 6.0)]].concat()
+            })
+            .corners(crossed(
+                &product(&[&[0.0, 0.9, 2.0], &[0.0], &[0.5], &[0.0, 0.04], &[0.5], &[1.0, 1000.0]]),
+                &product(&[&EXPONENTS[..]]),
+            )),
     ]
 }
 

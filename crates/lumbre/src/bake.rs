@@ -266,7 +266,8 @@ fn note_metals(world: &mut World, input: &Path) {
         };
         let by_texture = textures.and_then(|textures| textures.metallic_roughness.as_ref()).map(whole);
         count += 1;
-        metals += u32::from(by_texture.unwrap_or(diffuse == Vec3::ZERO && specular != Vec3::ZERO));
+        let is_metal = by_texture.unwrap_or(diffuse == Vec3::ZERO && specular != Vec3::ZERO);
+        metals += u32::from(is_metal && material.reflects_as_metal() && !material.unlit);
     }
     if metals > 0 {
         eprintln!(

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{AlphaMode, Light, Lobe, Material, Surface};
+use lumbre_optics::{AlphaMode, Light, Material, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 use serde::{Deserialize, Serialize};
 
@@ -52,8 +52,8 @@ impl fmt::Display for ContentHash {
 /// Computes the hash of everything that a [`Bake`](crate::Bake) of this World with these options depends on, so that a
 /// level whose hash has not changed need not be baked again.
 ///
-/// It covers the baker's version, the options, static meshes with their transforms, the diffuse reflection, emission
-/// and opacity of their materials with the pixels of their textures, the baked lights, and the sky, all in the order in
+/// It covers the baker's version, the options, static meshes with their transforms, the diffuse reflection, metals,
+/// emission and opacity of their materials with the pixels of their textures, the baked lights, and the sky, all in the order in
 /// which they are baked. If probes are baked, it also covers the bounding box of moving objects, and which emissive
 /// meshes are lights in real time. Baking a World does not change its hash, since the original meshes are hashed, not
 /// the unwrapped ones.
@@ -141,7 +141,8 @@ fn object_hash(object: &SceneObject, images: &mut Images) -> ContentHash {
         // `lights_frames` concerns only the probes and is hashed with them.
         let PlacedPrimitive { mesh, material, textures, transform, lights_frames: _ } = primitive;
         hasher.mesh(mesh);
-        let textures = textures.as_ref().map(|textures| images.textures(textures, material.lobe));
+        let textures =
+            textures.as_ref().map(|textures| images.textures(textures, material.reflects_as_metal()));
         hasher.text(&(baked_part(material), textures.unwrap_or_default(), transform));
     }
     hasher.text(&(name, lightmap_scale, primitives.len()))
@@ -155,15 +156,19 @@ fn light_hash(placed: &PlacedLight) -> ContentHash {
     Hasher::new("light").text(&(baked, position, axis))
 }
 
-/// What is baked of a material: diffuse reflection, what stands for the highlight of a metal (in place of its
-/// coefficient), emission and opacity, but neither mirrors nor refraction.
+/// What is baked of a material: diffuse reflection, the highlight of a metal, emission and opacity, but neither mirrors
+/// nor refraction.
 fn baked_part(material: &Material) -> Material {
     let unused = Material::default();
-    let surface = |surface: &Surface| Surface {
-        ambient: unused.front.ambient,
-        specular: reflectance_as_metal(material.lobe, surface),
-        shininess: unused.front.shininess,
-        ..*surface
+    let surface = |surface: &Surface| {
+        let is_metal = reflectance_as_metal(material, surface) != Vec3::ZERO;
+        let highlight = if is_metal { surface } else { &unused.front };
+        Surface {
+            ambient: unused.front.ambient,
+            specular: highlight.specular,
+            shininess: highlight.shininess,
+            ..*surface
+        }
     };
     Material {
         front: surface(&material.front),
@@ -187,12 +192,12 @@ struct Images(HashMap<*const Image, ContentHash>);
 impl Images {
     /// What is baked of a material's textures: normal and occlusion maps are ignored, as a lightmap holds the light on
     /// the geometric surface (docs/decisions.md says why).
-    fn textures(&mut self, textures: &MaterialTextures, lobe: Lobe) -> [Option<String>; 3] {
+    fn textures(&mut self, textures: &MaterialTextures, as_metal: bool) -> [Option<String>; 3] {
         let MaterialTextures { base_color, emissive, metallic_roughness, normal: _, occlusion: _ } = textures;
         let metallic_roughness = metallic_roughness.as_ref().map(|metallic_roughness| {
             let MetallicRoughnessTexture { texture, base_color, metallic, roughness, dielectric } =
                 metallic_roughness;
-            let of_metal = (lobe == Lobe::EnergyConserving).then_some((roughness, dielectric));
+            let of_metal = as_metal.then_some((roughness, dielectric));
             format!("{} {base_color:?} {metallic:?} {of_metal:?}", self.texture(texture))
         });
         let [base_color, emissive] =

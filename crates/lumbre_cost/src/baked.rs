@@ -9,7 +9,9 @@ use lumbre_bake::{
     Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, has_light_to_bake,
 };
 use lumbre_optics::Material;
-use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, Mesh, StaticObject, hidden_entities};
+use lumbre_scene::{
+    GlobalTransform, Lightmap, LightmapImage, MaterialTextures, Mesh, StaticObject, hidden_entities,
+};
 
 use crate::converged::Maps;
 use crate::picture::Picture;
@@ -184,7 +186,21 @@ pub fn bake_direct_light(
         }
         material.mirror = Vec3::ZERO;
     }
+    let mut slots = world.query::<(Entity, &mut MaterialTextures)>();
+    let mut own_slots = Vec::new();
+    for (entity, mut textures) in slots.iter_mut(&mut world) {
+        if let Some(slot) = &mut textures.metallic_roughness {
+            own_slots.push((entity, slot.base_color, slot.dielectric));
+            (slot.base_color, slot.dielectric) = (Vec3::ZERO, Vec3::ZERO);
+        }
+    }
     let (mut baked, _) = bake_world(conditions, world, options, None, told)?;
+    for (entity, base_color, dielectric) in own_slots {
+        let textures = baked.world.get_mut::<MaterialTextures>(entity);
+        if let Some(slot) = textures.and_then(|textures| textures.into_inner().metallic_roughness.as_mut()) {
+            (slot.base_color, slot.dielectric) = (base_color, dielectric);
+        }
+    }
     for (entity, material) in own {
         if let Ok(mut entity) = baked.world.get_entity_mut(entity) {
             entity.insert(material);

@@ -10,7 +10,7 @@ use std::time::Instant;
 use bevy_ecs::prelude::*;
 use glam::{Affine3A, DVec3, Mat3, Vec2, Vec3};
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{BakeMode, Light, Material, decode_srgb_byte};
+use lumbre_optics::{BakeMode, Light, Material, SurfaceSample, decode_srgb_byte, shininess_from_roughness};
 use lumbre_rays::{Bvh, Ray, offset_ray_origin, triangle_extent};
 use lumbre_scene::{
     GlobalTransform, Image, Lightmap, LightmapImage, MaterialTextures, Mesh, StaticObject, hidden_entities,
@@ -211,8 +211,7 @@ fn surfaces(world: &mut World) -> (Vec<Arc<LightmapImage>>, Vec<Surface>) {
             images.push(Arc::clone(&map.image));
             images.len() - 1
         });
-        let texture = textures.and_then(|textures| textures.base_color.as_ref());
-        let reflectance = material.front.diffuse * texture.map_or(Vec3::ONE, |texture| mean(&texture.image));
+        let reflectance = mean_reflectance(material, textures);
         let matrix = place.0;
         let world_from_mesh = Affine3A {
             matrix3: Mat3::from_cols_array(&matrix.matrix3.to_cols_array().map(|value| value as f32)).into(),
@@ -336,13 +335,34 @@ fn cosine_direction(normal: Vec3, ray: usize, rays: usize, texel: usize) -> Vec3
 }
 
 /// Returns the mean of a picture of colours, in linear light.
-fn mean(image: &Image) -> Vec3 {
+fn mean(image: &Image, decode: impl Fn(u8) -> f64) -> Vec3 {
     let pixels = image.rgba.as_chunks::<4>().0;
     let sum: DVec3 = pixels
         .iter()
-        .map(|[red, green, blue, _]| DVec3::from_array([*red, *green, *blue].map(decode_srgb_byte)))
+        .map(|[red, green, blue, _]| DVec3::from_array([*red, *green, *blue].map(&decode)))
         .sum();
     (sum / pixels.len().max(1) as f64).as_vec3()
+}
+
+/// Returns the reflectance of a material's front for baked light, whose textures count by their means.
+fn mean_reflectance(material: &Material, textures: Option<&MaterialTextures>) -> Vec3 {
+    let base = textures.and_then(|textures| textures.base_color.as_ref());
+    let tint = base.map_or(Vec3::ONE, |texture| mean(&texture.image, decode_srgb_byte));
+    let mut front = material.front;
+    front.specular *= tint;
+    if let Some(slot) = textures.and_then(|textures| textures.metallic_roughness.as_ref()) {
+        let texel = mean(&slot.texture.image, |byte| f64::from(byte) / 255.0);
+        let metallic = slot.metallic * texel.z;
+        front.diffuse = slot.base_color * (1.0 - metallic);
+        front.specular = slot.dielectric.lerp(slot.base_color * tint, metallic);
+        front.shininess = shininess_from_roughness(slot.roughness * texel.y);
+    }
+    front.diffuse *= tint;
+    let sample = SurfaceSample { lobe: material.lobe, ..SurfaceSample::from(&front) };
+    match material.reflects_as_metal() {
+        true => front.diffuse + sample.reflectance_as_metal().as_vec3(),
+        false => front.diffuse,
+    }
 }
 
 /// Fills texels without light from their neighbours, as far as filtering reads them.

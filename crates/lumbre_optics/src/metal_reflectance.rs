@@ -10,11 +10,12 @@
 //!
 //! **Only what exceeds a dielectric's 4 % counts.** Paint has a highlight as well, of at most 9 % of even light. But
 //! that light does not reach the pigment below, for which k_d makes no allowance: together they reflect at most
-//! 9 % of 1 - k_d more than k_d, and k_d alone can never send back more light than came in.
+//! 9 % of 1 - k_d more than k_d, and k_d alone can never send back more light than came in. For the same reason the
+//! share of a metal is at most 1 - k_d, which matters for dielectrics of more than 4 %.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use crate::{Lobe, SurfaceSample};
+use crate::{Lobe, Material, SurfaceSample};
 
 /// Reflectance of a dielectric at normal incidence: an index of refraction of 1.5.
 const DIELECTRIC: f64 = 0.04;
@@ -39,32 +40,43 @@ pub fn lobe_albedo(shininess: f64) -> f64 {
 /// Returns the diffuse reflectance that stands for an energy-conserving highlight, linear RGB: what of k_s exceeds
 /// that of a dielectric, (k_s - .04)/.96, times [`lobe_albedo`].
 ///
-/// For a metal whose reflectance is at least .3, it is at most 12 % below the reflectance under even light,
-/// because Schlick's rise at grazing angles is left out.
+/// It is at most 1 - k_d, so that both together reflect no more light than arrives. For a metal whose reflectance is at
+/// least .3, it is at most 12 % below the reflectance under even light, because Schlick's rise at grazing angles is left
+/// out.
 ///
 /// ```
 /// use glam::DVec3;
 /// use lumbre_optics::metal_reflectance;
 ///
 /// // Plastic reflects diffusely, and a smooth white metal all light.
-/// assert_eq!(metal_reflectance(DVec3::splat(0.04), 30.0), DVec3::ZERO);
-/// assert!(metal_reflectance(DVec3::ONE, 1e6).x > 0.999);
+/// assert_eq!(metal_reflectance(DVec3::splat(0.8), DVec3::splat(0.04), 30.0), DVec3::ZERO);
+/// assert!(metal_reflectance(DVec3::ZERO, DVec3::ONE, 1e6).x > 0.999);
 /// ```
 ///
 /// # Error of the f32 twin
 ///
-/// That of the albedo and 3 u of k_s.
-pub fn metal_reflectance(specular: DVec3, shininess: f64) -> DVec3 {
-    (specular - DIELECTRIC).max(DVec3::ZERO) * (lobe_albedo(shininess) / (1.0 - DIELECTRIC))
+/// That of the albedo, 5 u of k_s, and u where 1 - k_d is less.
+pub fn metal_reflectance(diffuse: DVec3, specular: DVec3, shininess: f64) -> DVec3 {
+    let metal = (specular - DIELECTRIC).max(DVec3::ZERO) * (lobe_albedo(shininess) / (1.0 - DIELECTRIC));
+    metal.min((1.0 - diffuse).max(DVec3::ZERO))
+}
+
+impl Material {
+    /// Returns true if its highlight may stand for a metal's: the lobe conserves energy, and no rays follow what it
+    /// mirrors and transmits, which would count that light twice.
+    pub fn reflects_as_metal(&self) -> bool {
+        self.lobe == Lobe::EnergyConserving && self.mirror == Vec3::ZERO && self.transmission == Vec3::ZERO
+    }
 }
 
 impl SurfaceSample {
     /// Returns the diffuse reflectance that stands for the surface's highlight under baked light: zero for a bare lobe,
-    /// whose k_s is no fraction of the light.
+    /// whose k_s is no fraction of the light. It is only for materials that [reflect as a
+    /// metal](Material::reflects_as_metal).
     pub fn reflectance_as_metal(&self) -> DVec3 {
         match self.lobe {
             Lobe::Bare => DVec3::ZERO,
-            Lobe::EnergyConserving => metal_reflectance(self.specular, self.shininess),
+            Lobe::EnergyConserving => metal_reflectance(self.diffuse, self.specular, self.shininess),
         }
     }
 }
@@ -132,8 +144,11 @@ mod tests {
 
     #[test]
     fn dielectrics_have_none_and_a_metal_keeps_its_colour() {
-        assert_eq!(metal_reflectance(DVec3::splat(f64::from(0.04_f32)), 0.0), DVec3::ZERO);
-        let gold = metal_reflectance(DVec3::new(1.0, 0.77, 0.34), 0.0) / lobe_albedo(0.0);
+        assert_eq!(metal_reflectance(DVec3::splat(0.5), DVec3::splat(f64::from(0.04_f32)), 0.0), DVec3::ZERO);
+        let gold = metal_reflectance(DVec3::ZERO, DVec3::new(1.0, 0.77, 0.34), 0.0) / lobe_albedo(0.0);
         assert!((gold - DVec3::new(1.0, 0.7604, 0.3125)).abs().max_element() < 1e-4, "{gold}");
+        // Diamond, white: k_d and its highlight together reflect no more than all light.
+        let diamond = metal_reflectance(DVec3::splat(0.95), DVec3::splat(0.17), 1e6);
+        assert!((diamond - 0.05).abs().max_element() < 1e-12, "{diamond}");
     }
 }

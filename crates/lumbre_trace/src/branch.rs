@@ -93,7 +93,7 @@ pub struct BranchLight {
     pub specular: DVec3,
     /// Σ S_i f_att k_t L_s (t·v)ⁿ.
     pub transmitted: DVec3,
-    /// k_d E/π of the lightmap.
+    /// Light of the lightmap: k_d E/π, and what stands for a metal's highlight.
     pub baked: DVec3,
     /// Emission of the surface.
     pub emission: DVec3,

@@ -80,7 +80,8 @@ pub(crate) fn direct_light(
     let object = &scene.objects[point.object];
     let mut light = DirectLight { emission: point.emission, ..DirectLight::default() };
     let mapped = point.baked.is_some();
-    let mut of_metal = point.baked.map_or(DVec3::ZERO, |baked| baked.metal);
+    // Irradiance/π of the baked lights whose highlights a metal shows.
+    let mut shown = DVec3::ZERO;
     // Both lightmaps and irradiance volumes hold the indirect light that the ambient term stands for.
     let indirect = mapped || point.from_volume.is_some();
     light.ambient_of_scene = match point.from_volume {
@@ -97,9 +98,9 @@ pub(crate) fn direct_light(
             continue;
         }
         let in_lightmap = mapped && placed.light.bake == BakeMode::Static;
-        let surface = if in_lightmap { as_in_lightmap(point) } else { point.surface };
+        let surface = if in_lightmap { white(point) } else { point.surface };
         let mut added = light_contribution(object.model, surface, &sample, point.normal, viewer);
-        let highlighted = if in_lightmap { std::mem::take(&mut added.diffuse) } else { DVec3::ZERO };
+        let highlighted = taken_from_lightmap(point, in_lightmap, &mut added);
         light.ambient += added.ambient;
         let mut through = DVec3::ZERO;
         if passing != DVec3::ZERO && !object.medium.thin {
@@ -134,7 +135,7 @@ pub(crate) fn direct_light(
         } else {
             DVec3::ONE
         };
-        of_metal -= visibility * highlighted;
+        shown += visibility * highlighted;
         light.add(number, visibility, added, through, lighting);
     }
     for (number, polygon) in scene.polygons.iter().enumerate() {
@@ -142,7 +143,7 @@ pub(crate) fn direct_light(
             continue;
         }
         let in_lightmap = mapped && polygon.baked;
-        let surface = if in_lightmap { as_in_lightmap(point) } else { point.surface };
+        let surface = if in_lightmap { white(point) } else { point.surface };
         let mut added = polygon_light_contribution(
             object.model,
             surface,
@@ -151,7 +152,7 @@ pub(crate) fn direct_light(
             point.normal,
             viewer,
         );
-        let highlighted = if in_lightmap { std::mem::take(&mut added.diffuse) } else { DVec3::ZERO };
+        let highlighted = taken_from_lightmap(point, in_lightmap, &mut added);
         light.ambient += added.ambient;
         if added.diffuse + added.specular + highlighted == DVec3::ZERO {
             light.add_ambient(scene.lights.len() + number, added.ambient, lighting);
@@ -163,17 +164,29 @@ pub(crate) fn direct_light(
             light.rays += rays;
             visibility = sum;
         }
-        of_metal -= visibility * highlighted;
+        shown += visibility * highlighted;
         light.add(scene.lights.len() + number, visibility, added, DVec3::ZERO, lighting);
     }
-    // The highlights of baked lights are there already.
-    light.baked = point.baked.map_or(DVec3::ZERO, |baked| baked.diffuse) + of_metal.max(DVec3::ZERO);
+    if let Some(baked) = &point.baked {
+        let beside_highlights = (baked.arriving - shown).max(DVec3::ZERO);
+        light.baked = point.surface.diffuse * baked.arriving + baked.metal * beside_highlights;
+    }
     light
 }
 
-/// Returns the surface as its lightmap sees it: what stands for a metal's highlight is its only diffuse reflection.
-fn as_in_lightmap(point: &SurfacePoint) -> SurfaceSample {
-    SurfaceSample { diffuse: point.surface.reflectance_as_metal(), ..point.surface }
+/// Takes the diffuse part of a light in the lightmap away. Returns it where the highlight of a metal shows the light.
+fn taken_from_lightmap(point: &SurfacePoint, in_lightmap: bool, added: &mut Contribution) -> DVec3 {
+    if !in_lightmap {
+        return DVec3::ZERO;
+    }
+    let taken = std::mem::take(&mut added.diffuse);
+    let is_metal = point.baked.is_some_and(|baked| baked.metal != DVec3::ZERO);
+    if is_metal { taken } else { DVec3::ZERO }
+}
+
+/// Returns the surface by which the irradiance of a light in the lightmap is found: its diffuse reflection is white.
+fn white(point: &SurfacePoint) -> SurfaceSample {
+    SurfaceSample { diffuse: DVec3::ONE, ..point.surface }
 }
 
 impl DirectLight {

@@ -42,9 +42,9 @@ pub(crate) struct SurfacePoint {
 /// What a surface reflects of the light in its lightmap.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BakedLight {
-    /// k_d E/π.
-    pub diffuse: DVec3,
-    /// What stands for a metal's highlight: the metal's reflectance times E/π.
+    /// E/π, weakened by an occlusion texture.
+    pub arriving: DVec3,
+    /// The diffuse reflectance that stands for a metal's highlight.
     pub metal: DVec3,
 }
 
@@ -137,20 +137,17 @@ impl SurfacePoint {
             let uv = object.coordinates(texture.tex_coord, vertices, weights);
             emission *= sample_color(texture, uv).truncate();
         }
+        // The base colour of a metal is its k_s; a metallic-roughness texture has modulated it already.
+        let of_texture = object.textures.metallic_roughness.is_some();
+        let base = if of_texture { DVec3::ONE } else { tint.truncate() };
+        let metal =
+            reflectance_as_metal(object, &SurfaceSample { specular: surface.specular * base, ..surface });
         let baked = object.lightmap.as_ref().map(|image| {
             let uv = object.coordinates(1, vertices, weights);
-            let arriving = sample_lightmap(image, uv) * unoccluded;
-            BakedLight {
-                diffuse: surface.diffuse * arriving,
-                metal: surface.reflectance_as_metal() * arriving,
-            }
+            BakedLight { arriving: sample_lightmap(image, uv) * unoccluded, metal }
         });
         let normal = facing_normal(normal, lit_as_front);
-        let from_volume = object.volume_light(
-            position,
-            normal,
-            (surface.diffuse + surface.reflectance_as_metal()) * unoccluded,
-        );
+        let from_volume = object.volume_light(position, normal, (surface.diffuse + metal) * unoccluded);
         Self {
             object: hit.candidate.object,
             position,
@@ -187,7 +184,7 @@ impl SurfacePoint {
             from_volume: object.volume_light(
                 position,
                 lit_normal,
-                surface.diffuse + surface.reflectance_as_metal(),
+                surface.diffuse + reflectance_as_metal(object, &surface),
             ),
             // The point is as uncertain as the coordinates of the ray's origin.
             extent: position.abs().max(ray.origin.abs()).max_element(),
@@ -206,6 +203,11 @@ impl SurfacePoint {
         let facing = if self.normal.dot(self.geometric) < 0.0 { -self.normal } else { self.normal };
         if facing.dot(viewer) > 0.0 { facing } else { self.geometric }
     }
+}
+
+/// Returns the diffuse reflectance that stands for the highlight of an object's surface.
+fn reflectance_as_metal(object: &Object, surface: &SurfaceSample) -> DVec3 {
+    if object.material.reflects_as_metal() { surface.reflectance_as_metal() } else { DVec3::ZERO }
 }
 
 /// Returns true if a back face is lit with its own normal: under the scene's two-sided rule, and always

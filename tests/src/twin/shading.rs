@@ -22,7 +22,7 @@ pub(super) struct PixelWeights {
 struct Lit {
     ambient: DVec3,
     direct: DVec3,
-    /// What a metal would reflect, as diffuse light, of the lights in its lightmap.
+    /// Irradiance/π of the lights in its lightmap.
     highlighted: DVec3,
 }
 
@@ -43,9 +43,7 @@ impl<'a> ShadedTriangle<'a> {
         shaded.colors = match object.shading {
             // The twin always uses Phong shading here, which is the reference for shading by need.
             Shading::Phong | Shading::Auto { .. } => None,
-            Shading::Gouraud => {
-                Some(triangle.each_ref().map(|v| shaded.lit(v.point, shaded.facing(v.normal), 0.0)))
-            }
+            Shading::Gouraud => Some(triangle.each_ref().map(|v| shaded.lit_at_vertex(v.point, v.normal))),
             Shading::Flat => {
                 let normal = (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::ZERO);
                 let last = &triangle[if object.mirrored { 1 } else { 2 }];
@@ -54,7 +52,7 @@ impl<'a> ShadedTriangle<'a> {
                     FlatRule::FirstVertex => (triangle[0].point, triangle[0].normal),
                     FlatRule::LastVertex => (last.point, last.normal),
                 };
-                Some([shaded.lit(point, shaded.facing(normal), 0.0); 3])
+                Some([shaded.lit_at_vertex(point, normal); 3])
             }
         };
         shaded
@@ -105,7 +103,7 @@ impl<'a> ShadedTriangle<'a> {
             let baked = sample_lightmap(lightmap, uv(1)) * unoccluded;
             let surface = SurfaceSample::new(&self.object.material, self.lit_as_front());
             color += surface.diffuse * baked;
-            color += (surface.reflectance_as_metal() * baked - lit.highlighted).max(DVec3::ZERO);
+            color += self.metal(&surface) * (baked - lit.highlighted).max(DVec3::ZERO);
         }
         match &self.scene.settings.fog {
             Some(fog) => {
@@ -124,6 +122,18 @@ impl<'a> ShadedTriangle<'a> {
     /// Returns a normal of the front, turned to the side that is lit.
     fn facing(&self, normal: DVec3) -> DVec3 {
         facing_normal(normal, self.lit_as_front())
+    }
+
+    /// The diffuse reflectance that stands for the highlight of a metal.
+    fn metal(&self, surface: &SurfaceSample) -> DVec3 {
+        if self.object.material.reflects_as_metal() { surface.reflectance_as_metal() } else { DVec3::ZERO }
+    }
+
+    /// The light at a vertex, or of a polygon. A lightmap is that of the front, so that the lights in it are the front's
+    /// on both sides.
+    fn lit_at_vertex(&self, point: DVec3, normal: DVec3) -> Lit {
+        let lit = self.lit(point, self.facing(normal), 0.0);
+        Lit { highlighted: self.lit(point, normal, 0.0).highlighted, ..lit }
     }
 
     /// `widening` is that of the highlight, 0 for none.
@@ -148,8 +158,7 @@ impl<'a> ShadedTriangle<'a> {
         let mut sum = Contribution::ZERO;
         if let Some(volume) = scene.volume.as_ref().filter(|_| !mapped) {
             let unfiltered = SurfaceSample::new(&self.object.material, front);
-            sum.ambient +=
-                (surface.diffuse + unfiltered.reflectance_as_metal()) * volume.light(point, normal);
+            sum.ambient += (surface.diffuse + self.metal(&unfiltered)) * volume.light(point, normal);
         } else if !mapped {
             sum.ambient +=
                 surface.ambient * (scene.settings.ambient.as_dvec3() + scene.settings.sky.as_dvec3());
@@ -165,8 +174,7 @@ impl<'a> ShadedTriangle<'a> {
     }
 
     /// Returns what each light adds at a point, and whether frames evaluate it there, which they do not for ambient
-    /// lights and lights that are off; third, what a metal would reflect of the light as diffuse light, if its lightmap
-    /// holds the light.
+    /// lights and lights that are off; third, its irradiance/π, if a lightmap holds the light.
     fn contributions(
         &self,
         surface: SurfaceSample,
@@ -176,9 +184,7 @@ impl<'a> ShadedTriangle<'a> {
     ) -> impl Iterator<Item = (bool, Contribution, DVec3)> {
         let (scene, reflection) = (self.scene, self.object.reflection);
         let mapped = self.object.lightmap.is_some();
-        let unfiltered = SurfaceSample::new(&self.object.material, self.lit_as_front());
-        let metal = unfiltered.reflectance_as_metal();
-        let as_metal = SurfaceSample { diffuse: metal, ..surface };
+        let white = SurfaceSample { diffuse: DVec3::ONE, ..surface };
         let of_lights = scene.lights.iter().map(move |(light, position, axis)| {
             let sample: LightSample = evaluate_light(light, *position, *axis, point);
             let mut added = light_contribution(reflection, surface, &sample, normal, viewer);
@@ -188,7 +194,7 @@ impl<'a> ShadedTriangle<'a> {
             let mut highlighted = DVec3::ZERO;
             if mapped && light.bake == lumbre_optics::BakeMode::Static {
                 added.diffuse = DVec3::ZERO;
-                highlighted = light_contribution(reflection, as_metal, &sample, normal, viewer).diffuse;
+                highlighted = light_contribution(reflection, white, &sample, normal, viewer).diffuse;
             }
             (light.enabled && light.kind != LightKind::Ambient, added, highlighted)
         });
@@ -199,8 +205,8 @@ impl<'a> ShadedTriangle<'a> {
             let mut highlighted = DVec3::ZERO;
             if mapped && polygon.baked {
                 added.diffuse = DVec3::ZERO;
-                let as_metal = polygon_light_contribution(reflection, as_metal, light, point, normal, viewer);
-                highlighted = as_metal.diffuse;
+                highlighted =
+                    polygon_light_contribution(reflection, white, light, point, normal, viewer).diffuse;
             }
             (true, added, highlighted)
         });

@@ -129,8 +129,9 @@ pub fn lobe_albedo() -> f64 {
     20.0 * U
 }
 
-/// metal_reflectance: that of the albedo, and 4 u of the coefficient; .04 is off by 1 u of itself, before 1/.96.
+/// metal_reflectance: that of the albedo, and 5 u of the coefficient; .04 is off by 1 u of itself, before 1/.96. A smaller
+/// 1 - k_d is off by u.
 pub fn metal_reflectance(specular: DVec3, shininess: f64) -> Allowed {
-    let value = optics::metal_reflectance(specular, shininess);
+    let value = optics::metal_reflectance(DVec3::ZERO, specular, shininess).max(DVec3::ONE);
     Allowed::from(value * (5.0 * U) + (specular.abs() / 0.96) * (lobe_albedo() + U) + FLUSHED)
 }

@@ -21,7 +21,7 @@ use crate::sample_allocation::{SampleAllocation, take_samples};
 use crate::sampling::{Sequence, Stream};
 use crate::scene::{Receiver, Side};
 
-/// One in this many samples also traces a real bounce, to check the patch that it reads.
+/// One in this many samples is checked: it traces a real bounce, too, if it reads a patch.
 const CHECK_INTERVAL: u32 = 4;
 
 /// The guide would hardly have led to a point if a sample's weight is more than this share of what it would be there
@@ -83,7 +83,8 @@ struct GatherContribution {
     texel_variance: f32,
     /// Whether the light of a texel was read, not that of a patch.
     reads_texel: bool,
-    /// Whether the patch that was read is checked against a real bounce, or none was read and this is the turn.
+    /// Whether it is its turn to be checked: the patch that was read against a real bounce. If nothing was hit, there is
+    /// nothing to differ.
     is_checked: bool,
     /// By how much the patch gives more light than the real bounce; before the check has run, the weight of that.
     difference: Vec3,
@@ -165,7 +166,7 @@ impl RadianceCache<'_> {
                 ..GatherContribution::default()
             };
             // Takes turns over replicates, samples and texels: every neighbourhood gets checks, however few samples
-            // there are. Of rays that hit nothing, too: they read no patch, and differ by nothing.
+            // there are. Rays that hit nothing take turns, too; their difference is zero.
             let turn =
                 (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.0.wrapping_mul(7));
             contribution.is_checked = turn.is_multiple_of(CHECK_INTERVAL);

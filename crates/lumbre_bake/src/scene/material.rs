@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3, Vec4};
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{AlphaMode, Lobe, Material, Surface, SurfaceSample, shininess_from_roughness};
+use lumbre_optics::{AlphaMode, Material, Surface, SurfaceSample, shininess_from_roughness};
 use lumbre_scene::{MaterialTextures, TextureReference};
 
 use super::texture::sample;
@@ -49,7 +49,7 @@ impl SurfaceMaterial {
         let Material { front, back, unlit, .. } = &self.material;
         let metallic = self.textures.as_ref().is_some_and(|textures| textures.metallic_roughness.is_some());
         let black = |side: &Surface| {
-            side.diffuse == Vec3::ZERO && reflectance_as_metal(self.material.lobe, side) == Vec3::ZERO
+            side.diffuse == Vec3::ZERO && reflectance_as_metal(&self.material, side) == Vec3::ZERO
         };
         *unlit || (black(front) && back.as_ref().is_none_or(black) && !metallic)
     }
@@ -125,8 +125,13 @@ impl SurfaceMaterial {
                 surface.shininess = shininess_from_roughness(slot.roughness * texel.y);
             }
         }
-        let reflected = surface.diffuse * tint + reflectance_as_metal(self.material.lobe, &surface);
-        clean(reflected).min(Vec3::splat(LARGEST_REFLECTANCE))
+        surface.diffuse *= tint;
+        if self.textures.as_ref().is_none_or(|textures| textures.metallic_roughness.is_none()) {
+            // The base colour of a metal is its k_s.
+            surface.specular *= tint;
+        }
+        clean(surface.diffuse + reflectance_as_metal(&self.material, &surface))
+            .min(Vec3::splat(LARGEST_REFLECTANCE))
     }
 
     /// Emitted radiance, W/(m² sr).
@@ -177,9 +182,12 @@ impl SurfaceMaterial {
     }
 }
 
-/// The diffuse reflectance that stands for the highlight of a side of a material with this lobe.
-pub(crate) fn reflectance_as_metal(lobe: Lobe, side: &Surface) -> Vec3 {
-    SurfaceSample { lobe, ..SurfaceSample::from(side) }.reflectance_as_metal().as_vec3()
+/// The diffuse reflectance that stands for the highlight of a side of a material.
+pub(crate) fn reflectance_as_metal(material: &Material, side: &Surface) -> Vec3 {
+    if !material.reflects_as_metal() {
+        return Vec3::ZERO;
+    }
+    SurfaceSample { lobe: material.lobe, ..SurfaceSample::from(side) }.reflectance_as_metal().as_vec3()
 }
 
 /// Replaces negative, infinite and NaN channels by 0.

@@ -10,7 +10,7 @@ use super::box_tree::BoxTree;
 use super::duplicates::is_hidden_duplicate;
 use super::hidden_side::closed_pieces;
 use super::leaks::Leaks;
-use super::material::{LARGEST_REFLECTANCE, Side};
+use super::material::{LARGEST_REFLECTANCE, Side, reflectance_as_metal};
 use super::rooms::{Room, all_within, closed_shells};
 use super::texture_coordinates::textures_of;
 use super::{LightmapLayout, MapLayout, PlacedPrimitive, SceneObject, SurfaceMaterial, world_points};
@@ -237,7 +237,9 @@ impl Extraction<'_> {
             let textured = primitive.textures.as_ref().is_some_and(|textures| {
                 textures.base_color.is_some() || textures.metallic_roughness.is_some()
             });
-            self.check_reflectance(&primitive.material.front.diffuse, textured, name);
+            let front = &primitive.material.front;
+            let reflectance = front.diffuse + reflectance_as_metal(&primitive.material, front);
+            self.check_reflectance(&reflectance, textured, name);
             let surface = self.surfaces.len() as u32;
             self.surfaces.push(SurfaceMaterial {
                 material: primitive.material.clone(),

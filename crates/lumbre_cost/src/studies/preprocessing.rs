@@ -143,8 +143,8 @@ fn of_scene(
     }
 }
 
-/// Returns the options of bakes before and after a change, for a level that is this many times as large as one room. With a larger error
-/// there would hardly be any rays that reusing a former bake could save.
+/// Returns the options of bakes before and after a change, for a level that is this many times as large as one room.
+/// With a larger error there would hardly be any rays that reusing a former bake could save.
 fn options_of(conditions: &Conditions<'_>, scene: &SceneFile, rooms: f64) -> Result<BakeOptions, CostError> {
     let texels = rooms * conditions.unless_quick(4_000.0, 700.0);
     Ok(BakeOptions { error: ERROR, ..bake_options(conditions, scene, texels)? })

@@ -97,6 +97,7 @@ mod tests {
             | Feature::NormalTexture
             | Feature::OcclusionTexture => vec![Feature::Uv0],
             Feature::Lightmap => vec![Feature::Uv1, Feature::StaticLights],
+            Feature::BakedMetal => vec![Feature::Lightmap, Feature::Uv1, Feature::StaticLights],
             Feature::AlphaMask => vec![Feature::Alpha],
             Feature::FogLinear
             | Feature::FogExponential
@@ -124,6 +125,44 @@ mod tests {
             let unlit = [Feature::BaseColorTexture, Feature::Uv0, Feature::Alpha];
             valid(&variant(*shading, &unlit));
         }
+    }
+
+    #[test]
+    fn the_fullest_vertex_stage_fits_the_limits_of_every_device() {
+        // `wgpu::Limits::default()` has 16 variables between the stages, of which `front_facing` is one.
+        const MOST: usize = 15;
+        let textures = [
+            Feature::BaseColorTexture,
+            Feature::EmissiveTexture,
+            Feature::MetallicRoughnessTexture,
+            Feature::OcclusionTexture,
+            Feature::NormalTexture,
+            Feature::Uv0,
+            Feature::Uv1,
+            Feature::Modulated,
+            Feature::VertexColor,
+            Feature::Fog,
+            Feature::FogLinear,
+            Feature::TwoSided,
+            Feature::BakedMetal,
+        ];
+        let mut fullest = 0;
+        for shading in Shading::ALL {
+            for baked in [Feature::Lightmap, Feature::IrradianceVolume] {
+                let features: Vec<_> =
+                    LIT.into_iter().chain(textures).chain([baked, Feature::StaticLights]).collect();
+                let wgsl = valid(&variant(*shading, &features));
+                let varyings = wgsl
+                    .split("struct ")
+                    .find(|part| part.lines().next().is_some_and(|name| name.contains("Varyings")));
+                let body =
+                    varyings.and_then(|part| part.split('}').next()).expect("the varyings are a structure");
+                let count = body.matches("@location").count();
+                assert!(count <= MOST, "{}, {baked:?}: {count}", shading.name());
+                fullest = fullest.max(count);
+            }
+        }
+        assert_eq!(fullest, MOST, "the list of features above is not the fullest");
     }
 
     #[test]

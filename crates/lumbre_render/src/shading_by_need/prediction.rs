@@ -296,7 +296,8 @@ impl LitPatch<'_> {
 
 /// Returns the diffuse reflectance that stands for a side's highlight.
 fn reflectance_as_metal(side: &Surface) -> Vec3 {
-    metal_reflectance(side.specular.as_dvec3(), f64::from(side.shininess_in_range())).as_vec3()
+    metal_reflectance(side.diffuse.as_dvec3(), side.specular.as_dvec3(), f64::from(side.shininess_in_range()))
+        .as_vec3()
 }
 
 /// Which side of a surface a light may reach.

@@ -45,8 +45,9 @@ pub struct ObjectTraits {
     pub lightmapped: bool,
     /// Whether its specular lobe is glTF's energy-conserving one.
     pub energy_conserving: bool,
-    /// Whether it reflects baked light like a metal: its lobe is energy-conserving, and its specular
-    /// coefficient, on either side or by a metallic-roughness texture, exceeds that of a dielectric.
+    /// Whether it reflects baked light like a metal: its lobe is energy-conserving, it neither mirrors nor
+    /// transmits light, and its specular coefficient, on either side or by a metallic-roughness texture,
+    /// exceeds that of a dielectric.
     pub metal: bool,
     /// Its microfacet distribution, for the Torrance-Sparrow model.
     pub distribution: Distribution,
@@ -157,10 +158,10 @@ impl ObjectTraits {
 
 /// Returns true if any part of a surface may be metal (see [`ObjectTraits::metal`]).
 fn is_metal(material: &Material, maps: Option<&MaterialTextures>) -> bool {
-    let reflects = |specular: Vec3| metal_reflectance(specular.as_dvec3(), 0.0) != DVec3::ZERO;
+    let reflects = |specular: Vec3| metal_reflectance(DVec3::ZERO, specular.as_dvec3(), 0.0) != DVec3::ZERO;
     let by_texture = maps.and_then(|maps| maps.metallic_roughness.as_ref());
     let sides = std::iter::once(&material.front).chain(&material.back);
-    material.lobe == Lobe::EnergyConserving
+    material.reflects_as_metal()
         && (sides.map(|side| side.specular).any(reflects)
             || by_texture.is_some_and(|slot| slot.metallic > 0.0 || reflects(slot.dielectric)))
 }
