@@ -64,12 +64,11 @@ impl TexelReads {
         self.rest += samples * rest;
     }
 
-    /// The share of the rest that remains in a texel, in [0, 1]: with a share s of its samples that read patches, it is
-    /// s + (1 - s) ρ r, where r remained in the texels that were read.
+    /// The share of the rest that remains in a texel, in [0, 1]: with a share s of its samples that read patches and t that
+    /// read texels, it is s + t ρ r, where r remained in the texels that were read.
     pub fn rest_in(&self, gathered: &GatherSums) -> f64 {
-        let texel_share = gathered.texel_share();
         let read = if self.samples > 0.0 { self.rest / self.samples } else { 1.0 };
-        1.0 - texel_share * (1.0 - self.reflectance * read)
+        gathered.patch_share() + gathered.texel_share() * self.reflectance * read
     }
 }
 
@@ -180,7 +179,7 @@ pub(crate) fn patch_bias(
         let unknown = unknown + known * known * variance;
         let correction = if correction.is_finite() { correction } else { DVec3::ZERO };
         let later = later_bounces.powi(2) * square(correction);
-        let patch_share = 1.0 - sums.texel_share();
+        let patch_share = sums.patch_share();
         let remaining = reads.rest_in(sums).powi(2);
         LocalBias {
             correction: (patch_share * correction).as_vec3(),

@@ -21,7 +21,7 @@ use crate::sample_allocation::{SampleAllocation, take_samples};
 use crate::sampling::{Sequence, Stream};
 use crate::scene::{Receiver, Side};
 
-/// One in this many samples is checked: it traces a real bounce, too, if it reads a patch.
+/// One in this many samples also traces a real bounce, to check the patch that it reads.
 const CHECK_INTERVAL: u32 = 4;
 
 /// The guide would hardly have led to a point if a sample's weight is more than this share of what it would be there
@@ -83,8 +83,7 @@ struct GatherContribution {
     texel_variance: f32,
     /// Whether the light of a texel was read, not that of a patch.
     reads_texel: bool,
-    /// Whether it is its turn to be checked: the patch that was read against a real bounce. If nothing was hit, there is
-    /// nothing to differ.
+    /// Whether the patch that was read is checked against a real bounce.
     is_checked: bool,
     /// By how much the patch gives more light than the real bounce; before the check has run, the weight of that.
     difference: Vec3,
@@ -165,12 +164,10 @@ impl RadianceCache<'_> {
                 weight: incident.weight,
                 ..GatherContribution::default()
             };
-            // Takes turns over replicates, samples and texels: every neighbourhood gets checks, however few samples
-            // there are. Rays that hit nothing take turns, too; their difference is zero.
-            let turn =
-                (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.0.wrapping_mul(7));
-            contribution.is_checked = turn.is_multiple_of(CHECK_INTERVAL);
-            let Some(hit) = &mut incident.hit else { continue };
+            let Some(hit) = &mut incident.hit else {
+                gathered.sky_reads += u32::from(incident.light != Vec3::ZERO);
+                continue;
+            };
             if hit.is_steep {
                 let sequence = Sequence::new(seed, Stream::SteepLight(replicate as u32), texel.index.0);
                 let (direct, rays) = self.direct_light_at(hit.triangle, hit.at, sequence.of(sample));
@@ -180,6 +177,11 @@ impl RadianceCache<'_> {
             let inverse_distance = incident.weight / hit.distance.max(f32::MIN_POSITIVE);
             let normal = self.scene.triangles[hit.triangle as usize].normal;
             gathered.nearness.add(Nearness::of_surface(inverse_distance, normal, &map_axes));
+            // Takes turns over replicates, samples and texels: every neighbourhood gets checks, however few samples
+            // there are.
+            let turn =
+                (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.0.wrapping_mul(7));
+            contribution.is_checked = turn.is_multiple_of(CHECK_INTERVAL);
             let receiver = &samples.requests[slot].receiver;
             let last = self.read(receiver, hit, &sequences[replicate], sample, contribution);
             if let Some(last) = last.filter(|_| contribution.is_checked) {

@@ -40,7 +40,7 @@ pub(crate) struct DensePoint {
     /// Irradiance by direct light and by bounces, as each half of the samples finds it.
     pub direct: [Vec3; 2],
     pub indirect: [Vec3; 2],
-    /// Checks of patches against real bounces (rays that hit nothing count, too), and the sum of their differences.
+    /// Checks of patches against real bounces, and the sum of their differences.
     pub checks: u32,
     pub differences: Vec3,
     pub rays: u64,
