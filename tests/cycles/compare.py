@@ -13,11 +13,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "mitsuba"))
 
 from described import load, with_meshes
+from judgement import SIZE, command, judged, noise
 from scenes import CAMERA, SCENES, box_faces, camera_matrix, glb
 
-SIZE = (240, 180)
-# Standard errors of the mean by which two pictures' brightness may differ.
-SIGMAS = 4.0
 # Pictures from whose differences an error is told.
 PARTS = 4
 
@@ -40,10 +38,8 @@ def read(path):
 
 def ours(program, scene, folder, samples, seed):
     output = folder / "ours.exr"
-    command = [program, "trace", scene, "-o", output, "--size", "{}x{}".format(*SIZE), "--display", "linear", "--no-default-light"]
-    command += ["--integrator", "path", "--samples", samples, "--seed", seed, "--threads", 2, "--quiet"]
     before = seconds_of(resource.RUSAGE_CHILDREN)
-    subprocess.run([str(word) for word in command], check=True)
+    subprocess.run(command(program, scene, output, samples) + ["--seed", str(seed), "--threads", "2"], check=True)
     return read(output), seconds_of(resource.RUSAGE_CHILDREN) - before
 
 
@@ -66,9 +62,7 @@ def measured(render, samples):
         part, used = render(max(samples // PARTS, 2), seed)
         parts.append(part)
         seconds += used - idle
-    mean = np.mean(parts, axis=0)
-    error = np.sqrt(np.var(parts, axis=0, ddof=1).mean() / PARTS) / mean.mean()
-    return mean, error, seconds
+    return *noise(parts), seconds
 
 
 def main():
@@ -81,29 +75,14 @@ def main():
         objects = with_meshes(exact)
         path = folder / f"{name}.glb"
         glb(objects, path)
-        own, own_error, own_seconds = measured(lambda count, seed: ours(program, path, folder, count, seed), samples)
+        own = measured(lambda count, seed: ours(program, path, folder, count, seed), samples)
         scene = load(objects, CAMERA, camera_matrix(), SIZE, box_faces)
-        other, error, seconds = measured(lambda count, seed: theirs(scene, folder, count, seed), samples)
-        both = np.hypot(own_error, error)
-        difference = np.sqrt(((own - other) ** 2).mean()) / other.mean()
-        bias = own.mean() / other.mean() - 1.0
-        # Of the mean over pixels, whose three channels go together.
-        of_mean = both / np.sqrt(SIZE[0] * SIZE[1])
-        agrees = abs(bias) < SIGMAS * of_mean and difference < 1.5 * both
+        other = measured(lambda count, seed: theirs(scene, folder, count, seed), samples)
+        agrees, _, words = judged(own, other)
         apart |= not agrees
-        print(
-            f"{name}: lumbre {100 * own_error:.2f} % of noise in {own_seconds:.1f} s of processors, Cycles {100 * error:.2f} % in "
-            f"{seconds:.1f} s, {samples} samples; apart by {100 * difference:.2f} %, by noise alone {100 * both:.2f} %; "
-            f"bias {100 * bias:+.3f} %, its standard error {100 * of_mean:.3f} %; "
-            f"equal-error time of ours over theirs {own_seconds * own_error**2 / (seconds * error**2):.2f}{'' if agrees else '; APART'}",
-            flush=True,
-        )
-        save(folder / f"{name}.npz", own, other)
+        print(f"{name}, {samples} samples, seconds of processors: {words}", flush=True)
+        np.savez_compressed(folder / f"{name}.npz", ours=own[0], theirs=other[0])
     sys.exit(int(apart))
-
-
-def save(path, own, other):
-    np.savez_compressed(path, ours=own, theirs=other)
 
 
 if __name__ == "__main__":

@@ -248,22 +248,21 @@ fn the_highlight_of_a_baked_lamp_is_not_counted_twice() {
     assert!((middle(&mut world) - highlight).abs().max_element() < 1e-3);
 }
 
+/// A metallic-roughness texture of one texel: green is roughness, blue is metallic.
+fn slot(texel: [u8; 4], base_color: Vec3, roughness: f32) -> MetallicRoughnessTexture {
+    let texture = sharp(&image(1, &[texel]));
+    MetallicRoughnessTexture { texture, base_color, metallic: 1.0, roughness, dielectric: Vec3::splat(0.04) }
+}
+
 #[test]
 fn textures_say_where_there_is_metal_as_rays_find_it() {
     let mut world = scene();
     add_panel(&mut world);
-    // Green is roughness, blue is metallic.
     let texels = [[255, 255, 255, 255], [255, 120, 255, 255], [255, 200, 0, 255], [255, 180, 128, 255]];
     let mut objects = world.query_filtered::<Entity, With<Lightmap>>();
     let objects: Vec<Entity> = objects.iter(&world).collect();
     for (object, texel) in objects.into_iter().zip(texels) {
-        let slot = MetallicRoughnessTexture {
-            texture: sharp(&image(1, &[texel])),
-            base_color: Vec3::new(0.9, 0.8, 0.6),
-            metallic: 1.0,
-            roughness: 1.0,
-            dielectric: Vec3::splat(0.04),
-        };
+        let slot = slot(texel, Vec3::new(0.9, 0.8, 0.6), 1.0);
         world.entity_mut(object).insert(MaterialTextures {
             base_color: Some(sharp(&image(1, &[[230, 180, 120, 255]]))),
             metallic_roughness: Some(slot),
@@ -306,13 +305,7 @@ fn textured_metal_is_the_same_in_every_shading() {
             let mesh = Arc::make_mut(&mut mesh.0);
             mesh.colors = vec![Vec4::new(0.2, 0.4, 0.6, 1.0); mesh.positions.len()];
         } else {
-            let slot = MetallicRoughnessTexture {
-                texture: sharp(&image(1, &[[255; 4]])),
-                base_color: Vec3::ONE,
-                metallic: 1.0,
-                roughness: 0.7,
-                dielectric: Vec3::splat(0.04),
-            };
+            let slot = slot([255; 4], Vec3::ONE, 0.7);
             world.entity_mut(object).insert(MaterialTextures {
                 base_color: Some(sharp(&image(1, &[[120, 180, 220, 255]]))),
                 metallic_roughness: Some(slot),

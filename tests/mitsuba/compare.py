@@ -11,19 +11,14 @@ from pathlib import Path
 import mitsuba
 import numpy as np
 
+from judgement import SIZE, command, judged, noise
 from scenes import SCENES, glb, mitsuba as described
-
-SIZE = (240, 180)
-# Standard errors of the mean by which two pictures' brightness may differ.
-SIGMAS = 4.0
 
 
 def ours(program, scene, folder, samples):
     """The picture, its stated standard error over its mean, seconds."""
     output = folder / "ours.exr"
-    command = [program, "trace", scene, "-o", output, "--size", "{}x{}".format(*SIZE), "--display", "linear", "--no-default-light"]
-    command += ["--integrator", "path", "--samples", str(samples), "--json", "--quiet"]
-    told = subprocess.run([str(word) for word in command], check=True, stdout=subprocess.PIPE)
+    told = subprocess.run(command(program, scene, output, samples) + ["--json"], check=True, stdout=subprocess.PIPE)
     report = json.loads(told.stdout)
     picture = np.array(mitsuba.Bitmap(str(output)).convert(mitsuba.Bitmap.PixelFormat.RGB))
     return picture.astype(float), report["standard_error"], report["seconds"]
@@ -41,9 +36,7 @@ def theirs(variant, objects, samples):
         part = np.array(mitsuba.render(scene, spp=max(samples // 4, 1), seed=seed), dtype=float)
         seconds += time.perf_counter() - started
         parts.append(part[..., :3])
-    mean = np.mean(parts, axis=0)
-    error = np.sqrt(np.var(parts, axis=0, ddof=1).mean() / len(parts)) / mean.mean()
-    return mean, error, seconds
+    return *noise(parts), seconds
 
 
 def main():
@@ -58,24 +51,12 @@ def main():
     for name, objects in SCENES.items():
         scene = folder / f"{name}.glb"
         glb(objects, scene)
-        own, own_error, own_seconds = ours(program, scene, folder, samples)
-        print(f"{name}: lumbre {100 * own_error:.2f} % of noise in {own_seconds:.1f} s, {samples} samples")
-        other, error, seconds = theirs(variant, objects, samples)
-        both = np.hypot(own_error, error)
-        difference = np.sqrt(((own - other) ** 2).mean()) / other.mean()
-        bias = own.mean() / other.mean() - 1.0
-        # Of the mean over pixels, whose three channels go together.
-        of_mean = both / np.sqrt(SIZE[0] * SIZE[1])
-        slower = own_seconds * own_error**2 / (seconds * error**2)
-        agrees = abs(bias) < SIGMAS * of_mean and difference < 1.5 * both
+        own = ours(program, scene, folder, samples)
+        other = theirs(variant, objects, samples)
+        agrees, both, words = judged(own, other)
         apart |= not agrees
-        print(
-            f"  {variant}: {100 * error:.2f} % of noise in {seconds:.1f} s; "
-            f"apart by {100 * difference:.2f} %, by noise alone {100 * both:.2f} %; "
-            f"bias {100 * bias:+.3f} %, its standard error {100 * of_mean:.3f} %; "
-            f"equal-error time of ours over theirs {slower:.2f}{'' if agrees else '; APART'}"
-        )
-        save(folder / f"{name}.png", own, other, both)
+        print(f"{name}, {samples} samples, against {variant}: {words}", flush=True)
+        save(folder / f"{name}.png", own[0], other[0], both)
     sys.exit(int(apart))
 
 

@@ -75,14 +75,7 @@ pub fn sharp(image: &Arc<Image>) -> TextureReference {
         minify_linear: false,
         mipmap: Mipmap::None,
     };
-    TextureReference {
-        image: Arc::clone(image),
-        sampler,
-        tex_coord: 0,
-        offset: Vec2::ZERO,
-        rotation: 0.0,
-        scale: Vec2::ONE,
-    }
+    TextureReference { sampler, ..TextureReference::new(Arc::clone(image)) }
 }
 
 /// Returns the linear value of an sRGB code (IEC 61966-2-1).

@@ -9,13 +9,13 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use bevy_ecs::query::With;
 use bevy_ecs::world::World;
-use glam::Vec3;
+use glam::DVec3;
 use lumbre::bake::{
     BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Samples,
     SamplesError, Solver, content_hash,
 };
 use lumbre::demo::{ATLAS_SIDE, has_light_to_bake};
-use lumbre::optics::{Material, Surface};
+use lumbre::optics::{Material, SurfaceSample};
 use lumbre::scene::{
     LightmapEncoding, MaterialTextures, MetallicRoughnessTexture, SaveOptions, SceneSettings, StaticObject,
     Supercompression, save_baked,
@@ -260,13 +260,16 @@ fn note_metals(world: &mut World, input: &Path) {
     let mut objects = world.query_filtered::<(&Material, Option<&MaterialTextures>), With<StaticObject>>();
     let (mut count, mut metals) = (0, 0);
     for (material, textures) in objects.iter(world) {
-        let Surface { diffuse, specular, .. } = material.front;
         let whole = |slot: &MetallicRoughnessTexture| {
             slot.metallic == 1.0 && slot.texture.image.rgba.chunks(4).all(|texel| texel[2] == u8::MAX)
         };
         let by_texture = textures.and_then(|textures| textures.metallic_roughness.as_ref()).map(whole);
         count += 1;
-        let is_metal = by_texture.unwrap_or(diffuse == Vec3::ZERO && specular != Vec3::ZERO);
+        let of_one_colour = || {
+            let front = SurfaceSample::new(material, true);
+            front.diffuse == DVec3::ZERO && front.reflectance_as_metal() != DVec3::ZERO
+        };
+        let is_metal = by_texture.unwrap_or_else(of_one_colour);
         metals += u32::from(is_metal && material.reflects_as_metal() && !material.unlit);
     }
     if metals > 0 {

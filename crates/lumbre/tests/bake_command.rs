@@ -12,11 +12,10 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use bevy_ecs::world::World;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use lumbre::optics::{Material, Surface};
 use lumbre::scene::{
-    Camera, MaterialTextures, Mesh, MetallicRoughnessTexture, Sampler, StaticObject, TextureReference,
-    Transform,
+    Camera, MaterialTextures, Mesh, MetallicRoughnessTexture, StaticObject, TextureReference, Transform,
 };
 
 const LUMBRE: &str = env!("CARGO_BIN_EXE_lumbre");
@@ -412,14 +411,7 @@ fn metals_are_counted() {
         let rgba = vec![255, 255, 255, 255, 255, 255, blue, 255];
         let image = lumbre::scene::Image { name: "metal".into(), width: 2, height: 1, rgba };
         let slot = MetallicRoughnessTexture {
-            texture: TextureReference {
-                image: Arc::new(image),
-                sampler: Sampler::default(),
-                tex_coord: 0,
-                offset: Vec2::ZERO,
-                rotation: 0.0,
-                scale: Vec2::ONE,
-            },
+            texture: TextureReference::new(Arc::new(image)),
             base_color: Vec3::ONE,
             metallic: 1.0,
             roughness: 1.0,
@@ -428,10 +420,14 @@ fn metals_are_counted() {
         let textures = MaterialTextures { metallic_roughness: Some(slot), ..MaterialTextures::default() };
         world.spawn((cube.clone(), metal.clone(), textures, StaticObject, Transform::from_xyz(x, 0.0, 0.0)));
     }
-    world.spawn((cube, Material::matt(Vec3::ONE), StaticObject, Transform::from_xyz(0.0, 3.0, 0.0)));
+    // Black plastic has no diffuse reflection, either.
+    for (plastic, y) in [(Vec3::ONE, 3.0), (Vec3::ZERO, -3.0)] {
+        let plastic = Material::from_metallic_roughness(plastic, 0.0, 0.5);
+        world.spawn((cube.clone(), plastic, StaticObject, Transform::from_xyz(0.0, y, 0.0)));
+    }
     lumbre::scene::save(&mut world, &place.level).unwrap();
     let said = stderr(&done(&mut place.bake(&["--sky", "1"])));
-    assert!(said.contains("2 of 4 static meshes are metal"), "{said}");
+    assert!(said.contains("2 of 5 static meshes are metal"), "{said}");
 }
 
 #[test]

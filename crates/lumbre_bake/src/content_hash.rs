@@ -52,9 +52,9 @@ impl fmt::Display for ContentHash {
 /// Computes the hash of everything that a [`Bake`](crate::Bake) of this World with these options depends on, so that a
 /// level whose hash has not changed need not be baked again.
 ///
-/// It covers the baker's version, the options, static meshes with their transforms, the diffuse reflection, metals,
-/// emission and opacity of their materials with the pixels of their textures, the baked lights, and the sky, all in the order in
-/// which they are baked. If probes are baked, it also covers the bounding box of moving objects, and which emissive
+/// It covers the baker's version, the options, static meshes with their transforms, the diffuse reflection, the
+/// highlights of metals, emission and opacity of their materials with the pixels of their textures, the baked lights,
+/// and the sky, all in the order in which they are baked. If probes are baked, it also covers the bounding box of moving objects, and which emissive
 /// meshes are lights in real time. Baking a World does not change its hash, since the original meshes are hashed, not
 /// the unwrapped ones.
 ///

@@ -13,11 +13,11 @@ use std::time::Instant;
 
 use bevy_ecs::change_detection::DetectChangesMut;
 use bevy_ecs::prelude::*;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{AlphaMode, Light, Material, SpotCone};
 use lumbre_render::{FrameOptions, Gpu, MissingPipelines, Offscreen, OffscreenFormat, Renderer};
-use lumbre_scene::{Camera, Image, MaterialTextures, Mesh, Sampler, TextureReference, Transform};
+use lumbre_scene::{Camera, Image, MaterialTextures, Mesh, TextureReference, Transform};
 
 /// The name of a change, and what it does.
 type Change<'a> = (&'static str, &'a dyn Fn(&mut World));
@@ -127,14 +127,7 @@ fn checks() -> MaterialTextures {
     });
     let image = Image { name: "checks".to_owned(), width: 64, height: 64, rgba: texels.collect() };
     MaterialTextures {
-        base_color: Some(TextureReference {
-            image: Arc::new(image),
-            sampler: Sampler::default(),
-            tex_coord: 0,
-            offset: Vec2::ZERO,
-            rotation: 0.0,
-            scale: Vec2::ONE,
-        }),
+        base_color: Some(TextureReference::new(Arc::new(image))),
         ..MaterialTextures::default()
     }
 }

@@ -73,7 +73,7 @@ mod tests {
     use lumbre_mesh::TriangleMesh;
 
     use super::*;
-    use crate::{Camera, GlobalTransform, Image, LightmapEncoding, LightmapImage, Sampler, TextureReference};
+    use crate::{Camera, GlobalTransform, Image, LightmapEncoding, LightmapImage, TextureReference};
 
     fn world(material: Material) -> World {
         let mut world = World::new();
@@ -94,10 +94,7 @@ mod tests {
         let mut display = world(glowing.clone());
         let shown = display.query_filtered::<Entity, With<Mesh>>().single(&display).unwrap();
         let image = Image { name: String::new(), width: 1, height: 1, rgba: vec![255; 4] };
-        let (sampler, scale) = (Sampler::default(), glam::Vec2::ONE);
-        let offset = glam::Vec2::ZERO;
-        let texture =
-            TextureReference { image: Arc::new(image), sampler, tex_coord: 0, offset, rotation: 0.0, scale };
+        let texture = TextureReference::new(Arc::new(image));
         display
             .entity_mut(shown)
             .insert(MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() });

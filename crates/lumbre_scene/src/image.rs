@@ -107,6 +107,18 @@ pub struct TextureReference {
 }
 
 impl TextureReference {
+    /// Refers to an image by the first set of coordinates as they are, with the default sampler.
+    pub fn new(image: Arc<Image>) -> Self {
+        Self {
+            image,
+            sampler: Sampler::default(),
+            tex_coord: 0,
+            offset: Vec2::ZERO,
+            rotation: 0.0,
+            scale: Vec2::ONE,
+        }
+    }
+
     /// The rows of the 2x3 coordinate transform: u' = row · (u, v, 1). As in `KHR_texture_transform`,
     /// coordinates are scaled, then rotated, then translated. v points down, so the rotation matrix looks
     /// clockwise.

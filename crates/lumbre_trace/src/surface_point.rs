@@ -137,11 +137,15 @@ impl SurfacePoint {
             let uv = object.coordinates(texture.tex_coord, vertices, weights);
             emission *= sample_color(texture, uv).truncate();
         }
-        // The base colour of a metal is its k_s; a metallic-roughness texture has modulated it already.
-        let of_texture = object.textures.metallic_roughness.is_some();
-        let base = if of_texture { DVec3::ONE } else { tint.truncate() };
-        let metal =
-            reflectance_as_metal(object, &SurfaceSample { specular: surface.specular * base, ..surface });
+        let metal = match object.takes_baked_light() {
+            false => DVec3::ZERO,
+            // The base colour of a metal is its k_s; a metallic-roughness texture has modulated it already.
+            true if object.textures.metallic_roughness.is_some() => reflectance_as_metal(object, &surface),
+            true => {
+                let specular = surface.specular * tint.truncate();
+                reflectance_as_metal(object, &SurfaceSample { specular, ..surface })
+            }
+        };
         let baked = object.lightmap.as_ref().map(|image| {
             let uv = object.coordinates(1, vertices, weights);
             BakedLight { arriving: sample_lightmap(image, uv) * unoccluded, metal }

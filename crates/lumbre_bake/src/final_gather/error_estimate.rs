@@ -64,8 +64,8 @@ impl TexelReads {
         self.rest += samples * rest;
     }
 
-    /// The share of the rest that remains in a texel, in [0, 1]: with a share s of its samples that read patches and t that
-    /// read texels, it is s + t ρ r, where r remained in the texels that were read.
+    /// The share of the rest that remains in a texel, in [0, 1]: with a share s of its samples that read patches and t
+    /// that read texels, it is s + t ρ r, where r remained in the texels that were read.
     pub fn rest_in(&self, gathered: &GatherSums) -> f64 {
         let read = if self.samples > 0.0 { self.rest / self.samples } else { 1.0 };
         gathered.patch_share() + gathered.texel_share() * self.reflectance * read

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::Material;
-use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, Sampler, TextureReference};
+use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 
 use super::form_factor_tests::{scene, square};
 use super::patch_index::PatchIndex;
@@ -73,14 +73,8 @@ fn no_patch_lies_partly_under_an_object() {
 fn textured(is_white: impl Fn(u32, u32) -> bool) -> BakeScene {
     let mut scene = scene(&[&square([0.0; 3], Vec3::Z * 2.0, Vec3::X * 2.0)]);
     let rgba = (0..64 * 64).flat_map(|at| [if is_white(at % 64, at / 64) { 255 } else { 0 }; 4]).collect();
-    let texture = TextureReference {
-        image: Arc::new(Image { name: "texture".into(), width: 64, height: 64, rgba }),
-        sampler: Sampler::default(),
-        tex_coord: 0,
-        offset: Vec2::ZERO,
-        rotation: 0.0,
-        scale: Vec2::ONE,
-    };
+    let texture =
+        TextureReference::new(Arc::new(Image { name: "texture".into(), width: 64, height: 64, rgba }));
     let surface = &mut scene.surfaces[0];
     surface.material = Material::matt(Vec3::splat(0.8));
     surface.textures = Some(MaterialTextures { base_color: Some(texture), ..MaterialTextures::default() });

@@ -52,20 +52,13 @@ fn wrap(index: f32, size: u32, wrap: Wrap) -> usize {
 mod tests {
     use std::sync::Arc;
 
-    use lumbre_scene::{Image, Sampler};
+    use lumbre_scene::Image;
 
     use super::*;
 
     fn two_texels() -> TextureReference {
         let rgba = vec![0, 0, 0, 255, 255, 255, 255, 255];
-        TextureReference {
-            image: Arc::new(Image { name: "two".into(), width: 2, height: 1, rgba }),
-            sampler: Sampler::default(),
-            tex_coord: 0,
-            offset: Vec2::ZERO,
-            rotation: 0.0,
-            scale: Vec2::ONE,
-        }
+        TextureReference::new(Arc::new(Image { name: "two".into(), width: 2, height: 1, rgba }))
     }
 
     #[test]

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_ecs::prelude::*;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use lumbre_bake::{
     Bake, BakeOptions, ContentHash, Density, FormFactorMethod, Probes, Quality, Solver, content_hash,
 };
 use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Lobe, Material, SpotCone, Surface};
 use lumbre_scene::{
     Camera, DynamicObject, EmissiveLight, Hidden, Image, LightmapScale, MaterialTextures, Mesh,
-    MetallicRoughnessTexture, Name, Sampler, TextureReference, Transform, Wrap,
+    MetallicRoughnessTexture, Name, TextureReference, Transform, Wrap,
 };
 
 use crate::corner::corner;
@@ -54,16 +54,15 @@ fn add_dynamic_ball(world: &mut World, at: f64) {
 
 /// The hash of the scene with a textured floor, after a change of its textures.
 fn textured(change: impl FnOnce(&mut MaterialTextures)) -> ContentHash {
+    textured_with(Lobe::Bare, change)
+}
+
+/// The same with this lobe.
+fn textured_with(lobe: Lobe, change: impl FnOnce(&mut MaterialTextures)) -> ContentHash {
     hash(|world| {
+        material(world, |material| material.lobe = lobe);
         let image = Image { name: "tiles".into(), width: 2, height: 1, rgba: vec![9; 8] };
-        let reference = TextureReference {
-            image: Arc::new(image),
-            sampler: Sampler::default(),
-            tex_coord: 0,
-            offset: Vec2::ZERO,
-            rotation: 0.0,
-            scale: Vec2::ONE,
-        };
+        let reference = TextureReference::new(Arc::new(image));
         let of_metal = MetallicRoughnessTexture {
             texture: reference.clone(),
             base_color: Vec3::ONE,
@@ -134,28 +133,7 @@ fn what_stands_for_the_highlight_of_a_metal_changes_the_hash() {
     assert_ne!(metal, look(Vec3::splat(0.8), 1.0, 0.6));
     assert_eq!(look(Vec3::splat(0.9), 0.0, 0.6), look(Vec3::splat(0.2), 0.0, 0.9), "plastics have none");
     let by_texture = |roughness: f32, lobe: Lobe| {
-        let mut world = corner();
-        let image = Image { name: "grey".into(), width: 1, height: 1, rgba: vec![200; 4] };
-        let texture = TextureReference {
-            image: Arc::new(image),
-            sampler: Sampler::default(),
-            tex_coord: 0,
-            offset: Vec2::ZERO,
-            rotation: 0.0,
-            scale: Vec2::ONE,
-        };
-        let slot = MetallicRoughnessTexture {
-            texture,
-            base_color: Vec3::ONE,
-            metallic: 1.0,
-            roughness,
-            dielectric: Vec3::splat(0.04),
-        };
-        let floor = object(&mut world, "floor");
-        let textures = MaterialTextures { metallic_roughness: Some(slot), ..MaterialTextures::default() };
-        world.entity_mut(floor).insert(textures);
-        material(&mut world, |material| material.lobe = lobe);
-        content_hash(&mut world, &BakeOptions::default()).unwrap()
+        textured_with(lobe, |textures| textures.metallic_roughness.as_mut().unwrap().roughness = roughness)
     };
     let energy_conserving = by_texture(0.5, Lobe::EnergyConserving);
     assert_ne!(energy_conserving, by_texture(0.6, Lobe::EnergyConserving));

@@ -173,14 +173,7 @@ fn emission_that_varies_by_texture() {
         (0..N * N).flat_map(|i| [[0, 0, 0, 255u8], [255; 4]][usize::from(bright(i % N, i / N))]).collect();
     let image = Arc::new(Image { name: "stripes".into(), width: N as u32, height: N as u32, rgba });
     let sampler = Sampler { wrap_u: Wrap::ClampToEdge, wrap_v: Wrap::ClampToEdge, ..Sampler::default() };
-    let texture = TextureReference {
-        image,
-        sampler,
-        tex_coord: 0,
-        offset: Vec2::ZERO,
-        rotation: 0.0,
-        scale: Vec2::ONE,
-    };
+    let texture = TextureReference { sampler, ..TextureReference::new(image) };
     let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
     let (side, height) = (1.0f64, 0.2f64);
     let mut world = World::new();
@@ -224,14 +217,8 @@ fn one_bright_texel(side: u32) -> (World, BakeReport) {
     let mut rgba = vec![0; 4 * (side * side) as usize];
     let (x, y) = (side / 3 + 1, side / 5 + 1);
     rgba[4 * (y * side + x) as usize..][..4].copy_from_slice(&[255; 4]);
-    let texture = TextureReference {
-        image: Arc::new(Image { name: "one".into(), width: side, height: side, rgba }),
-        sampler: Sampler::default(),
-        tex_coord: 0,
-        offset: Vec2::ZERO,
-        rotation: 0.0,
-        scale: Vec2::ONE,
-    };
+    let texture =
+        TextureReference::new(Arc::new(Image { name: "one".into(), width: side, height: side, rgba }));
     let mut world = World::new();
     spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.0, 0.0));
     let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };

@@ -10,7 +10,7 @@ use lumbre_bake::{Bake, BakeError, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{
-    Image, Lightmap, MaterialTextures, Mesh, Name, OcclusionTexture, Sampler, StaticObject, TextureReference,
+    Image, Lightmap, MaterialTextures, Mesh, Name, OcclusionTexture, StaticObject, TextureReference,
     Transform,
 };
 
@@ -31,12 +31,13 @@ fn floor() -> Arc<TriangleMesh> {
 fn stripes(tex_coord: u32) -> TextureReference {
     let row = [[0u8, 0, 0, 255], [255; 4]].concat();
     TextureReference {
-        image: Arc::new(Image { name: "stripes".into(), width: 2, height: 2, rgba: row.repeat(2) }),
-        sampler: Sampler::default(),
         tex_coord,
-        offset: Vec2::ZERO,
-        rotation: 0.0,
-        scale: Vec2::ONE,
+        ..TextureReference::new(Arc::new(Image {
+            name: "stripes".into(),
+            width: 2,
+            height: 2,
+            rgba: row.repeat(2),
+        }))
     }
 }
 

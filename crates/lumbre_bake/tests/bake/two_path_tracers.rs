@@ -103,12 +103,8 @@ fn lit_by_a_screen() -> World {
     let bright = |_| if random.uniform() < 0.3 { (255.0 * random.uniform()) as u8 } else { 20 };
     let rgba = (0..4 * width * height).map(bright).collect();
     let texture = TextureReference {
-        image: Arc::new(Image { name: "screen".into(), width, height, rgba }),
         sampler: Sampler { wrap_u: Wrap::ClampToEdge, wrap_v: Wrap::ClampToEdge, ..Sampler::default() },
-        tex_coord: 0,
-        offset: glam::Vec2::ZERO,
-        rotation: 0.0,
-        scale: glam::Vec2::ONE,
+        ..TextureReference::new(Arc::new(Image { name: "screen".into(), width, height, rgba }))
     };
     let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
     let place = Transform::from_xyz(-1.7, 0.2, -0.4)

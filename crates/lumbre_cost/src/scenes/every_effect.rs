@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::{DQuat, Vec2, Vec3};
+use glam::{DQuat, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{AlphaMode, ErrorBound, Light, Material, Shading, Surface};
 use lumbre_scene::{
-    DynamicObject, Image, MaterialTextures, Medium, Mesh, Name, NormalTexture, OcclusionTexture, Sampler,
+    DynamicObject, Image, MaterialTextures, Medium, Mesh, Name, NormalTexture, OcclusionTexture,
     SceneSettings, TextureReference, Transform,
 };
 
@@ -74,14 +74,7 @@ fn texture(name: &str, texel: impl Fn(u32, u32) -> [u8; 4]) -> TextureReference 
     let side = 32;
     let rgba =
         (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect();
-    TextureReference {
-        image: Arc::new(Image { name: name.to_owned(), width: side, height: side, rgba }),
-        sampler: Sampler::default(),
-        tex_coord: 0,
-        offset: Vec2::ZERO,
-        rotation: 0.0,
-        scale: Vec2::ONE,
-    }
+    TextureReference::new(Arc::new(Image { name: name.to_owned(), width: side, height: side, rgba }))
 }
 
 #[cfg(test)]

@@ -4,12 +4,12 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::{DQuat, DVec3, Vec2, Vec3};
+use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{BakeMode, Fog, FogMode, Light, Material, SpotCone, Surface};
 use lumbre_scene::{
-    Camera, DynamicObject, EmissiveLight, Image, MaterialTextures, Mesh, Name, Projection, Sampler,
-    SceneSettings, StaticObject, TextureReference, Transform,
+    Camera, DynamicObject, EmissiveLight, Image, MaterialTextures, Mesh, Name, Projection, SceneSettings,
+    StaticObject, TextureReference, Transform,
 };
 
 /// Inner width, height and depth in metres.
@@ -184,12 +184,5 @@ fn tiles() -> TextureReference {
         if (x / 8 + y / 8).is_multiple_of(2) { [225, 220, 210, 255] } else { [150, 145, 140, 255] }
     };
     let rgba = (0..side).flat_map(|y| (0..side).flat_map(move |x| texel(x, y))).collect();
-    TextureReference {
-        image: Arc::new(Image { name: "tiles".into(), width: side, height: side, rgba }),
-        sampler: Sampler::default(),
-        tex_coord: 0,
-        offset: Vec2::ZERO,
-        rotation: 0.0,
-        scale: Vec2::ONE,
-    }
+    TextureReference::new(Arc::new(Image { name: "tiles".into(), width: side, height: side, rgba }))
 }

@@ -43,12 +43,8 @@ fn draw(name: &str, size: u32, pattern: Pattern) -> Drawn {
         rgba.push((alpha * 255.0f64).round() as u8);
     }
     let texture = TextureReference {
-        image: Arc::new(Image { name: name.to_owned(), width: size, height: size, rgba }),
         sampler: Sampler { wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat, ..Sampler::default() },
-        tex_coord: 0,
-        offset: glam::Vec2::ZERO,
-        rotation: 0.0,
-        scale: glam::Vec2::ONE,
+        ..TextureReference::new(Arc::new(Image { name: name.to_owned(), width: size, height: size, rgba }))
     };
     Drawn { texture, tint: tint.as_vec3() }
 }

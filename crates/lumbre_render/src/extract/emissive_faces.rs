@@ -183,7 +183,7 @@ mod tests {
     use std::sync::Arc;
 
     use lumbre_mesh::shapes;
-    use lumbre_scene::{Image, Sampler};
+    use lumbre_scene::Image;
 
     use super::*;
 
@@ -260,14 +260,7 @@ mod tests {
         // The left half is black and the right half white, so one of the quad's two triangles is darker.
         let image =
             Image { name: "half".into(), width: 2, height: 1, rgba: vec![0, 0, 0, 255, 255, 255, 255, 255] };
-        let texture = TextureReference {
-            image: Arc::new(image),
-            sampler: Sampler::default(),
-            tex_coord: 0,
-            offset: Vec2::ZERO,
-            rotation: 0.0,
-            scale: Vec2::ONE,
-        };
+        let texture = TextureReference::new(Arc::new(image));
         let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
         let found = faces(&quad(), Some(&textures)).unwrap();
         assert_eq!(found.len(), 2);

@@ -83,6 +83,11 @@ impl Object {
         low.cmplt(high).all() && own.cmpge(low).all() && own.cmple(high).all()
     }
 
+    /// Returns true if a lightmap or an irradiance volume lights it.
+    pub fn takes_baked_light(&self) -> bool {
+        self.lightmap.is_some() || self.volume.is_some()
+    }
+
     /// Returns the light of the irradiance volume that lights it, if there is one, with this reflectance.
     pub fn volume_light(&self, point: DVec3, normal: DVec3, reflectance: DVec3) -> Option<DVec3> {
         self.volume.as_ref().map(|(volume, place)| reflectance * volume.light(place, point, normal))

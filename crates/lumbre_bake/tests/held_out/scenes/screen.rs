@@ -29,14 +29,7 @@ pub fn screen(texels: u64, scale: f64) -> World {
     };
     let image = Image { name: "screen".into(), width, height, rgba: pixels(width, height) };
     let clamped = Sampler { wrap_u: Wrap::ClampToEdge, wrap_v: Wrap::ClampToEdge, ..Sampler::default() };
-    let texture = TextureReference {
-        image: Arc::new(image),
-        sampler: clamped,
-        tex_coord: 0,
-        offset: Vec2::ZERO,
-        rotation: 0.0,
-        scale: Vec2::ONE,
-    };
+    let texture = TextureReference { sampler: clamped, ..TextureReference::new(Arc::new(image)) };
     let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
     b.world.spawn((
         Name::new("screen"),
