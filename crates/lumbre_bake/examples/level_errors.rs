@@ -1,11 +1,13 @@
 //! Measures the errors of baked levels in the region that a player sees: `level_errors [NAME|FILE.glb …] [--error X]
-//! [--time SECONDS] [--seed N] [--texels-per-meter N] [--points N] [--cache FOLDER] [--reference] [--anew|--paths]
-//! [--flip] [--pictures FOLDER] [--stages] [--no-denoise] [--no-seams] [--patch-texels N]`.
+//! [--time SECONDS] [--seed N] [--texels-per-meter N] [--points N] [--cache FOLDER] [--reference]
+//! [--anew|--paths|--converged] [--flip] [--pictures FOLDER] [--stages] [--no-denoise] [--no-seams] [--patch-texels N]`.
 //!
 //! It bakes each level (all of them if none is named) and prints one row for it: errors at reference points away from
 //! shadow edges, relative to the light around a point. The reference points are read from the cache or from the tests'
 //! folder (not from the latter with `--anew`) and computed if there are none; with `--paths` they are computed by paths
-//! that no cached light cuts short, unbiased and noisy.
+//! that no cached light cuts short, unbiased and noisy. With `--converged` the points show what a converged bake of the
+//! same texels has there: then the errors are those that more rays would remove, without what the map's resolution
+//! leaves and without a reference's noise.
 //!
 //! With `--flip` the level's view is compared with that of a converged bake of the same texels, which is also stored in
 //! the cache; with `--pictures` the views are written, the converged one only with `--flip`.
@@ -40,6 +42,8 @@ const HEIGHT: usize = 400;
 const MAX_BATCHES: usize = 1200;
 /// The number of worst points that are listed.
 const WORST: usize = 24;
+/// Paths of a point, two batches of so many squared, where they only decide whether the edge of a shadow is near.
+const EDGE_PATHS: usize = 8;
 /// The time limit of a converged bake.
 const CONVERGED_TIME: Duration = Duration::from_secs(900);
 
@@ -56,6 +60,8 @@ struct Request {
     /// Whether new reference points are computed by full paths, which are unbiased but far noisier than those that end
     /// in cached light.
     paths: bool,
+    /// Whether the reference is a converged bake of the same texels.
+    converged: bool,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -68,6 +74,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         stages: false,
         anew: false,
         paths: false,
+        converged: false,
     };
     let mut names = Vec::new();
     let mut arguments = std::env::args().skip(1);
@@ -80,6 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--seed" => options.seed = value()?.parse()?,
             "--anew" => request.anew = true,
             "--paths" => (request.paths, request.anew) = (true, true),
+            "--converged" => (request.converged, request.anew) = (true, true),
             "--reference" => options.quality = Quality::Reference,
             "--no-denoise" => options.denoise = false,
             "--no-seams" => options.seams = false,
@@ -115,7 +123,7 @@ fn print_row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
     let build = || world_of(Path::new(name));
     let name = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
     let name = name.as_ref();
-    let points = points(name, &mut build()?, request)?;
+    let points = points(name, build()?, request)?;
     let mut world = build()?;
     let report = baked(&mut world, &request.options)?;
     let errors = point_errors::measure(&mut world, &points);
@@ -195,25 +203,53 @@ fn baked(world: &mut World, options: &BakeOptions) -> Result<BakeReport, Box<dyn
 
 /// Reads the level's reference points from the cache or the tests' folder; if there are none, computes them and stores
 /// them in the cache.
-fn points(name: &str, world: &mut World, request: &Request) -> Result<Vec<Irradiance>, Box<dyn Error>> {
+fn points(name: &str, mut world: World, request: &Request) -> Result<Vec<Irradiance>, Box<dyn Error>> {
     let tests_folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
-    let file = |folder: &Path| folder.join(name).with_extension("csv");
+    let extension = if request.converged { "converged.csv" } else { "csv" };
+    let file = |folder: &Path| folder.join(name).with_extension(extension);
     let tests_folder = if request.anew { None } else { Some(&tests_folder) };
     for folder in request.cache.iter().chain(tests_folder) {
         if file(folder).exists() {
             return Ok(reference_points::read(&file(folder)));
         }
     }
-    let tracer = PathTracer::new(world);
-    let (tracer, effort) = match request.paths {
-        true => (tracer, Effort { batches: [16, MAX_BATCHES], ..Effort::reference() }),
-        false => (tracer.with_indirect_cache(7), Effort::reference()),
+    let tracer = PathTracer::new(&mut world);
+    let points = if request.converged {
+        let points = tracer.points(request.points, Effort::fixed(2, EDGE_PATHS), 7);
+        converged_points(world, &points, &request.options)?
+    } else {
+        let (tracer, effort) = match request.paths {
+            true => (tracer, Effort { batches: [16, MAX_BATCHES], ..Effort::reference() }),
+            false => (tracer.with_indirect_cache(7), Effort::reference()),
+        };
+        tracer.points(request.points, effort, 7)
     };
-    let points = tracer.points(request.points, effort, 7);
     if let Some(folder) = &request.cache {
         reference_points::write(&file(folder), &points)?;
     }
     Ok(points)
+}
+
+/// The points with the light that a converged bake of the same texels shows there, as if it were exact.
+fn converged_points(
+    mut world: World,
+    points: &[Irradiance],
+    options: &BakeOptions,
+) -> Result<Vec<Irradiance>, Box<dyn Error>> {
+    let report = baked(&mut world, &converged(options))?;
+    eprintln!("converged: {report}");
+    let errors = point_errors::measure(&mut world, points);
+    let shown = errors.rows.iter().filter_map(|[position, _, value, ..]| {
+        let point = points.iter().find(|point| point.position == *position)?;
+        Some(Irradiance { value: *value, error: DVec3::ZERO, ..*point })
+    });
+    Ok(shown.collect())
+}
+
+/// The options of a converged bake of the same texels.
+fn converged(options: &BakeOptions) -> BakeOptions {
+    let (quality, time) = (Quality::Reference, Some(CONVERGED_TIME));
+    BakeOptions { quality, error: 2e-3, time, seed: 99, denoise: true, seams: true, ..*options }
 }
 
 /// The mean FLIP error between the views of this bake and of a converged one, both with the exposure of the latter.
@@ -238,14 +274,7 @@ fn compared_views(
         Some(file) if file.exists() => read_view(file)?,
         _ => {
             let mut world = scene()?;
-            let options = BakeOptions {
-                quality: Quality::Reference,
-                error: 2e-3,
-                time: Some(CONVERGED_TIME),
-                seed: 99,
-                ..request.options
-            };
-            let report = baked(&mut world, &options)?;
+            let report = baked(&mut world, &converged(&request.options))?;
             eprintln!("{name} converged: {report}");
             let view = View::of(&mut world, WIDTH, HEIGHT).ok_or("a level without a camera")?;
             if let Some(file) = &file {

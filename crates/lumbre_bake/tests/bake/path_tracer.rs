@@ -166,7 +166,7 @@ fn many_lamps_as_their_sum() {
 #[ignore = "slow: scripts/test --all runs it"]
 fn guided_paths_and_light_gathered_before_change_nothing_but_noise() {
     // The sunlit room by plain paths, by paths that are guided to its window and to the sun on its floor, and by paths
-    // that end in the indirect cache at their first bounce.
+    // that end in the indirect cache.
     let places: Vec<_> = [
         ([2.5, 2.7, 2.0], DVec3::NEG_Y),
         ([5.0, 1.8, 1.0], DVec3::NEG_X),
@@ -186,7 +186,7 @@ fn guided_paths_and_light_gathered_before_change_nothing_but_noise() {
         println!("guided {}, gathered before {}, bare {}", show(a), show(b), show(c));
         for (one, other, allowed) in [(a, c, 0.0), (b, c, 0.01)] {
             let sigma = one.error.x.hypot(other.error.x) + allowed * other.value.x;
-            // The cached light is constant over a quarter of a metre, for which 1 % is allowed.
+            // The cached light is constant over a tenth of a metre, for which 1 % is allowed.
             assert!((one.value.x - other.value.x).abs() < 4.0 * sigma, "{}", one.position);
         }
     }

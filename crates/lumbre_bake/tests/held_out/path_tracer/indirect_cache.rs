@@ -1,7 +1,8 @@
 //! A cache of indirect irradiance on pieces of all surfaces, which the pieces gather from one another in many rounds.
-//! Paths that use it end at their first bounce. There are several sets that share no random numbers, so that their
-//! differences give the standard error. The cached light is constant over a piece and therefore slightly biased; paths
-//! without it are not.
+//! Paths that use it end after a few bounces. There are several sets that share no random numbers, so that their
+//! differences give the standard error. All points read the same sets, so that their errors are not independent: behind
+//! a grille (`grille_0`) all of them are too bright or too dark by some 2 % together. The cached light is constant over
+//! a piece and therefore slightly biased; paths without it are not.
 
 use std::f64::consts::PI;
 
@@ -23,7 +24,7 @@ pub struct IndirectCache {
 /// The number of independent sets.
 pub const SETS: usize = 6;
 /// The approximate length of a piece's edge in metres, inside and outside the region.
-const EDGE: f64 = 0.25;
+const EDGE: f64 = 0.1;
 const EDGE_OUTSIDE: f64 = 1.0;
 /// The rays of a piece in each round.
 const RAYS: usize = 12;
