@@ -238,7 +238,7 @@ impl PathTracer {
             if !already_sampled {
                 sum += weight * self.direct_light_by_one_ray([origin, normal], random) / PI;
             }
-            if let Some(cache) = self.indirect_cache.as_ref().filter(|_| bounce == LAST_BOUNCE) {
+            if let Some(cache) = self.indirect_cache.as_ref().filter(|_| bounce >= LAST_BOUNCE) {
                 sum += weight * cache.at(self, set, hit.triangle, origin) / PI;
                 break;
             }
