@@ -55,13 +55,20 @@ struct Request {
     flip: bool,
     pictures: Option<PathBuf>,
     stages: bool,
-    /// Whether the reference points in the tests' folder are ignored.
-    anew: bool,
-    /// Whether new reference points are computed by full paths, which are unbiased but far noisier than those that end
-    /// in cached light.
-    paths: bool,
-    /// Whether the reference is a converged bake of the same texels.
-    converged: bool,
+    reference: Reference,
+}
+
+/// What bakes are compared with.
+#[derive(Clone, Copy, PartialEq)]
+enum Reference {
+    /// The points in the tests' folder; where there are none, as [`Reference::CachedLight`].
+    Stored,
+    /// New points, by paths that end in cached light.
+    CachedLight,
+    /// New points by full paths, which are unbiased but far noisier.
+    Paths,
+    /// A converged bake of the same texels.
+    Converged,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -72,9 +79,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         flip: false,
         pictures: None,
         stages: false,
-        anew: false,
-        paths: false,
-        converged: false,
+        reference: Reference::Stored,
     };
     let mut names = Vec::new();
     let mut arguments = std::env::args().skip(1);
@@ -85,9 +90,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--error" => options.error = value()?.parse()?,
             "--time" => options.time = Some(Duration::try_from_secs_f64(value()?.parse()?)?),
             "--seed" => options.seed = value()?.parse()?,
-            "--anew" => request.anew = true,
-            "--paths" => (request.paths, request.anew) = (true, true),
-            "--converged" => (request.converged, request.anew) = (true, true),
+            "--anew" => request.reference = Reference::CachedLight,
+            "--paths" => request.reference = Reference::Paths,
+            "--converged" => request.reference = Reference::Converged,
             "--reference" => options.quality = Quality::Reference,
             "--no-denoise" => options.denoise = false,
             "--no-seams" => options.seams = false,
@@ -205,24 +210,27 @@ fn baked(world: &mut World, options: &BakeOptions) -> Result<BakeReport, Box<dyn
 /// them in the cache.
 fn points(name: &str, mut world: World, request: &Request) -> Result<Vec<Irradiance>, Box<dyn Error>> {
     let tests_folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
-    let extension = if request.converged { "converged.csv" } else { "csv" };
+    let extension = if request.reference == Reference::Converged { "converged.csv" } else { "csv" };
     let file = |folder: &Path| folder.join(name).with_extension(extension);
-    let tests_folder = if request.anew { None } else { Some(&tests_folder) };
+    let tests_folder = Some(&tests_folder).filter(|_| request.reference == Reference::Stored);
     for folder in request.cache.iter().chain(tests_folder) {
         if file(folder).exists() {
             return Ok(reference_points::read(&file(folder)));
         }
     }
     let tracer = PathTracer::new(&mut world);
-    let points = if request.converged {
-        let points = tracer.points(request.points, Effort::fixed(2, EDGE_PATHS), 7);
-        converged_points(world, &points, &request.options)?
-    } else {
-        let (tracer, effort) = match request.paths {
-            true => (tracer, Effort { batches: [16, MAX_BATCHES], ..Effort::reference() }),
-            false => (tracer.with_indirect_cache(7), Effort::reference()),
-        };
-        tracer.points(request.points, effort, 7)
+    let points = match request.reference {
+        Reference::Converged => {
+            let points = tracer.points(request.points, Effort::fixed(2, EDGE_PATHS), 7);
+            converged_points(world, &points, &request.options)?
+        }
+        Reference::Paths => {
+            let effort = Effort { batches: [16, MAX_BATCHES], ..Effort::reference() };
+            tracer.points(request.points, effort, 7)
+        }
+        Reference::Stored | Reference::CachedLight => {
+            tracer.with_indirect_cache(7).points(request.points, Effort::reference(), 7)
+        }
     };
     if let Some(folder) = &request.cache {
         reference_points::write(&file(folder), &points)?;
@@ -238,10 +246,11 @@ fn converged_points(
 ) -> Result<Vec<Irradiance>, Box<dyn Error>> {
     let report = baked(&mut world, &converged(options))?;
     eprintln!("converged: {report}");
-    let errors = point_errors::measure(&mut world, points);
-    let shown = errors.rows.iter().filter_map(|[position, _, value, ..]| {
-        let point = points.iter().find(|point| point.position == *position)?;
-        Some(Irradiance { value: *value, error: DVec3::ZERO, ..*point })
+    let surfaces = common::lightmapped(&mut world);
+    let shown = points.iter().filter_map(|point| {
+        let Irradiance { position, normal, value: irradiance, .. } = *point;
+        let value = common::look_up(&surfaces, &common::ReferencePoint { position, normal, irradiance })?;
+        Some(Irradiance { value, error: DVec3::ZERO, ..*point })
     });
     Ok(shown.collect())
 }

@@ -1,7 +1,7 @@
 //! A cache of indirect irradiance on pieces of all surfaces, which the pieces gather from one another in many rounds.
 //! Paths that use it end after a few bounces. There are several sets that share no random numbers, so that their
 //! differences give the standard error. All points read the same sets, so that their errors are not independent: behind
-//! a grille (`grille_0`) all of them are too bright or too dark by some 2 % together. The cached light is constant over
+//! a grille (`grille_0`) all of them are too bright or too dark by one to two per cent together. The cached light is constant over
 //! a piece and therefore slightly biased; paths without it are not.
 
 use std::f64::consts::PI;
