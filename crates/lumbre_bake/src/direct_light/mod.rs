@@ -35,6 +35,8 @@ pub(crate) struct DirectLight {
     pub texels: Vec<Direct>,
     /// The local light of each of them, relative to which errors count.
     pub local: LocalLight,
+    /// Samples that it took, of all texels together: shadow rays to individual sources, and samples of the others.
+    pub samples: u64,
 }
 
 impl DirectLight {
@@ -84,12 +86,15 @@ pub(crate) fn direct_light(
         seconds_of_last_goal = monitor.seconds() - begun;
     }
     let mut direct = light.direct;
+    let rays =
+        |direct: &[Direct]| sampler.unknown().map(|texel| u64::from(direct[texel.place()].rays)).sum::<u64>();
+    let mut samples = rays(&direct);
     if let Some(shared) = shared {
+        samples += shared.samples();
         shared.add_to(&mut direct);
     }
-    let rays = sampler.unknown().map(|texel| u64::from(direct[texel.place()].rays));
-    let notes = StageNotes::of_rays(rays.sum());
-    Ok((DirectLight { texels: direct, local }, notes))
+    let notes = StageNotes::of_rays(rays(&direct));
+    Ok((DirectLight { texels: direct, local, samples }, notes))
 }
 
 /// Whether there is too little time to aim at the goal after the last one, whose refinement took so many seconds.

@@ -43,6 +43,9 @@ const MIN_ROUND: f64 = 0.15;
 /// Once the mean over the level reaches the requested error, the total number of rays may rise to this multiple of the
 /// quality's limit for the sake of views that do not: a level's brightest place hides what its rooms still need.
 const RAYS_FOR_VIEWS: f64 = 1.5;
+/// Direct light and the gather together may take this multiple of the quality's limit, so that a level whose direct
+/// light is simple gets more rays for its bounces, in the same time.
+const WITH_DIRECT_LIGHT: f64 = 2.25;
 /// A round that adds a smaller fraction of the rays cast is not worth another smoothing either: while a round needs
 /// fewer, it aims at [`LOWER_TARGET`] of the squared error, down to [`LEAST_TARGET`] of what was requested.
 const WORTHWHILE: f64 = 0.02;
@@ -334,7 +337,7 @@ impl<'a> RoundPlanner<'a> {
         let requested = self.options.error.powi(2);
         let is_whole_reached = error.relative <= self.options.error;
         let of_quality = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
-        let limit = sample_limit(of_quality, cast, is_whole_reached);
+        let limit = sample_limit(of_quality, self.direct.samples / REPLICATES as u64, cast, is_whole_reached);
         let budget = limit.saturating_sub(cast);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let missed = if is_whole_reached { error.in_worst_view } else { error.relative };
@@ -385,13 +388,16 @@ impl<'a> RoundPlanner<'a> {
     }
 }
 
-/// Most samples in all, given those of the quality and those that have been cast. More are allowed for views once the
-/// whole level has reached the requested error. Samples beyond a small step can only have been cast for views: the
-/// whole level had reached it then, and is near it still, so that the limit stays raised.
-fn sample_limit(of_quality: u64, cast: u64, is_whole_reached: bool) -> u64 {
-    match is_whole_reached || cast > times(of_quality, SMALL_STEP_RAYS) {
-        true => times(of_quality, RAYS_FOR_VIEWS),
-        false => of_quality,
+/// Most samples in all, given those of the quality, those that direct light has taken, and those that have been cast.
+/// What direct light has left of [`WITH_DIRECT_LIGHT`] is the gather's, and more are allowed for views once the whole
+/// level has reached the requested error. Samples beyond a small step can only have been cast for views: the whole
+/// level had reached it then, and is near it still, so that the limit stays raised.
+fn sample_limit(of_quality: u64, of_direct_light: u64, cast: u64, is_whole_reached: bool) -> u64 {
+    let left = times(of_quality, WITH_DIRECT_LIGHT).saturating_sub(of_direct_light);
+    let limit = of_quality.max(left);
+    match is_whole_reached || cast > times(limit, SMALL_STEP_RAYS) {
+        true => times(of_quality, RAYS_FOR_VIEWS).max(limit),
+        false => limit,
     }
 }
 
@@ -412,8 +418,15 @@ mod tests {
 
     #[test]
     fn views_get_half_as_many_samples_again_once_the_whole_level_has_its_error() {
-        assert_eq!([0, 990, 1250].map(|cast| sample_limit(1000, cast, false)), [1000; 3]);
-        assert_eq!([0, 990, 1400].map(|cast| sample_limit(1000, cast, true)), [1500; 3]);
-        assert_eq!(sample_limit(1000, 1400, false), 1500, "a limit that was raised stays so");
+        assert_eq!([0, 990, 1250].map(|cast| sample_limit(1000, 1250, cast, false)), [1000; 3]);
+        assert_eq!([0, 990, 1400].map(|cast| sample_limit(1000, 1250, cast, true)), [1500; 3]);
+        assert_eq!(sample_limit(1000, 1250, 1400, false), 1500, "a limit that was raised stays so");
+    }
+
+    #[test]
+    fn the_gather_gets_the_samples_that_direct_light_leaves() {
+        let limit = |of_direct_light| sample_limit(1000, of_direct_light, 0, false);
+        assert_eq!([0, 250, 1000, 1250, 9000].map(limit), [2250, 2000, 1250, 1000, 1000]);
+        assert_eq!(sample_limit(1000, 250, 0, true), 2000, "already more than views would add");
     }
 }

@@ -61,11 +61,12 @@ impl Sources<'_> {
         for (place, (&node, weight)) in nodes.iter().zip(weights).enumerate() {
             let samples = samples_for(sampled.samples, weight / brightest);
             let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
-            let unoccluded = || {
-                ReceiverQuadrature::mean(|x, y| {
+            let unoccluded = || match sampled.is_point {
+                true => (self.emitter_tree.unoccluded(&self.emitters, node, &anchor), 0.0),
+                false => ReceiverQuadrature::mean(|x, y| {
                     let receiver = (sampled.point)(x, y)?;
                     Some(self.emitter_tree.unoccluded(&self.emitters, node, &receiver))
-                })
+                }),
             };
             let occluders = sampled.visibility.lamps.iter().find(|occluders| occluders.node == node);
             let known = occluders.and_then(|occluders| match occluders.emitters.is_empty() {
@@ -86,8 +87,8 @@ impl Sources<'_> {
             let (light, uneven) = unoccluded();
             if fraction.rays == 0 && light != Vec3::ZERO {
                 // All of a few samples may have hit emitters that face away.
-                let samples = RETRY_FACTOR * samples;
-                fraction = self.visible_fraction(node, &anchor, sampled, (samples, set), direct);
+                fraction =
+                    self.visible_fraction(node, &anchor, sampled, (RETRY_FACTOR * samples, set), direct);
             }
             irradiance += light * fraction.mean;
             direct.variance += channel_mean(light).powi(2) * fraction.variance
@@ -158,6 +159,10 @@ impl Sources<'_> {
         let (mut visible, mut hidden) = (0u32, 0u32);
         let (mut batch_all, mut batch_seen) = ([0.0f32; BATCHES], [0.0f32; BATCHES]);
         for sample in 0..samples {
+            // A retry: where a single ray is wanted, the first sample that can bring light is enough.
+            if sampled.samples == 1 && visible + hidden > 0 {
+                break;
+            }
             let batch = batch_of(sample, samples);
             let [x, y, u, v] = sampled.sequence.point(sample, set);
             let Some(receiver) = (sampled.point)(x, y) else { continue };

@@ -21,8 +21,9 @@ impl Sources<'_> {
         let corners = corners.iter().filter_map(|&(x, y)| point(x, y));
         let reach = corners.map(|corner| corner.position.distance(anchor.position)).fold(0.0, f32::max);
         let cut = self.cut(&anchor, reach, &[]);
-        let receiver =
-            SampledReceiver { point, covered: None, visibility: &Visibility::UNKNOWN, sequence, samples };
+        let is_point = reach == 0.0;
+        let visibility = &Visibility::UNKNOWN;
+        let receiver = SampledReceiver { point, covered: None, is_point, visibility, sequence, samples };
         let mut direct = self.irradiance_per_source(&cut, &receiver);
         self.add_shared_light(&cut.shared, sequence, SHARED_SAMPLES_FACTOR * samples, point, &mut direct);
         direct

@@ -16,6 +16,8 @@ pub(crate) struct SampledReceiver<'a, P: SurfacePoints> {
     /// Where `point` knows only a few points that stand for the receiver: maps the unit square onto all of it and what
     /// is beside it, where it gives `None`.
     pub covered: Option<&'a dyn Fn(f32, f32) -> Option<Receiver>>,
+    /// Whether it is a single point, so that its light need not be averaged.
+    pub is_point: bool,
     /// What is known of the occluders between it and the sources.
     pub visibility: &'a Visibility<'a>,
     pub sequence: Sequence,
