@@ -175,7 +175,8 @@ pub(crate) struct Effort {
     pub gather: [u32; 2],
     /// Limit for a bake's total, whatever error was requested (not of a final bake whose time is limited): most gather
     /// rays, and most samples of the sources that share them, per texel on average. The total may always be as large as
-    /// [`SMALL_BUDGET`]. The gather may exceed it by a half for views whose error is larger than the whole level's.
+    /// [`SMALL_BUDGET`]. The gather may exceed it by what direct light leaves, and for views whose error is larger than
+    /// the whole level's.
     pub mean: u32,
 }
 

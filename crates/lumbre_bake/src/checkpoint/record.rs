@@ -41,6 +41,7 @@ mod tests {
             variance: 0.1,
             caution: 0.05,
             rays: 7,
+            samples_without_ray: 3,
             sampled: true,
             seen: VisibilitySummary { partly: true, signature: 0xdead_beef },
         };
@@ -54,7 +55,8 @@ mod tests {
         let (again, cast_again): (Direct, PatchRayCounts) = read(&bytes).unwrap();
         let bits = |v: Vec3| v.to_array().map(f32::to_bits);
         assert_eq!((bits(again.baked), bits(again.mixed)), (bits(direct.baked), bits(direct.mixed)));
-        assert_eq!((again.rays, again.sampled, again.seen), (direct.rays, direct.sampled, direct.seen));
+        assert_eq!((again.rays, again.samples_without_ray), (direct.rays, direct.samples_without_ray));
+        assert_eq!((again.sampled, again.seen), (direct.sampled, direct.seen));
         assert_eq!((&cast_again.hits, cast_again.inside), (&cast.hits, cast.inside));
         assert_eq!((cast_again.missed, cast_again.count), (cast.missed, cast.count));
         // Bytes that are missing or left over are noticed.

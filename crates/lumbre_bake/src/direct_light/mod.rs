@@ -35,11 +35,16 @@ pub(crate) struct DirectLight {
     pub texels: Vec<Direct>,
     /// The local light of each of them, relative to which errors count.
     pub local: LocalLight,
-    /// Samples that it took, of all texels together: shadow rays to individual sources, and samples of the others.
-    pub samples: u64,
 }
 
 impl DirectLight {
+    /// Samples that all texels together took, those that are known from a previous bake included: shadow rays to
+    /// individual sources, and samples of the others.
+    pub fn samples(&self) -> u64 {
+        let of_texel = |direct: &Direct| u64::from(direct.rays) + u64::from(direct.samples_without_ray);
+        self.texels.iter().map(of_texel).sum()
+    }
+
     /// Irradiance (mixed lights included) per texel of all maps; NaN where no surface is in the open.
     pub fn by_place(&self, texels: &CoveredTexels<'_>) -> Vec<Vec3> {
         let mut total = vec![Vec3::NAN; texels.layout.texels];
@@ -86,15 +91,12 @@ pub(crate) fn direct_light(
         seconds_of_last_goal = monitor.seconds() - begun;
     }
     let mut direct = light.direct;
-    let rays =
-        |direct: &[Direct]| sampler.unknown().map(|texel| u64::from(direct[texel.place()].rays)).sum::<u64>();
-    let mut samples = rays(&direct);
     if let Some(shared) = shared {
-        samples += shared.samples();
         shared.add_to(&mut direct);
     }
-    let notes = StageNotes::of_rays(rays(&direct));
-    Ok((DirectLight { texels: direct, local, samples }, notes))
+    let rays = sampler.unknown().map(|texel| u64::from(direct[texel.place()].rays));
+    let notes = StageNotes::of_rays(rays.sum());
+    Ok((DirectLight { texels: direct, local }, notes))
 }
 
 /// Whether there is too little time to aim at the goal after the last one, whose refinement took so many seconds.

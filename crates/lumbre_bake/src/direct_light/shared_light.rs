@@ -225,11 +225,6 @@ impl<'a> SharedLight<'a> {
         }
     }
 
-    /// Samples that were taken, of all texels and replicates together.
-    pub fn samples(&self) -> u64 {
-        self.sums.iter().map(|sums| u64::from(sums.samples)).sum::<u64>() * REPLICATES as u64
-    }
-
     /// Adds the smoothed light to that of the individually sampled sources.
     pub fn add_to(self, direct: &mut [Direct]) {
         let (variances, Denoised { estimates, .. }) = (self.smoothed.errors(), self.smoothed);
@@ -241,6 +236,7 @@ impl<'a> SharedLight<'a> {
                 direct.variance += variance;
                 direct.caution += variance - variances.expected[place];
                 direct.rays += sums.rays;
+                direct.samples_without_ray += (sums.samples * REPLICATES as u32).saturating_sub(sums.rays);
                 direct.sampled = true;
             }
         }

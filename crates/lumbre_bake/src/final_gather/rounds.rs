@@ -337,7 +337,8 @@ impl<'a> RoundPlanner<'a> {
         let requested = self.options.error.powi(2);
         let is_whole_reached = error.relative <= self.options.error;
         let of_quality = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
-        let limit = sample_limit(of_quality, self.direct.samples / REPLICATES as u64, cast, is_whole_reached);
+        let limit =
+            sample_limit(of_quality, self.direct.samples() / REPLICATES as u64, cast, is_whole_reached);
         let budget = limit.saturating_sub(cast);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let missed = if is_whole_reached { error.in_worst_view } else { error.relative };

@@ -19,6 +19,8 @@ pub(crate) struct Direct {
     pub caution: f32,
     /// Number of rays cast.
     pub rays: u32,
+    /// Number of samples that needed no ray, as they met a source that faces away.
+    pub samples_without_ray: u32,
     /// Whether it was estimated from samples, so that more samples would improve it.
     pub sampled: bool,
     /// Which sources are visible.
