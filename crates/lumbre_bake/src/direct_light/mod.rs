@@ -3,7 +3,7 @@
 //! unless its result was exact (so the faint ends of a penumbra are found from their neighbours); then more where the
 //! requested error is not yet in reach. Under a time limit the later passes are made for one error after the other, from a
 //! coarse one to the requested one. Sources that do not matter by themselves share samples: that is `shared_light`. So do
-//! lamps where nearly everything lies in their penumbrae.
+//! lamps where a good part of a block of texels lies in penumbrae.
 
 mod error_goals;
 pub(crate) mod light_cuts;

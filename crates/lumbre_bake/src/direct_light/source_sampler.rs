@@ -135,7 +135,7 @@ impl<'a> SourceSampler<'a> {
         Ok(IndividualLight { direct, samples: vec![usual; count], doubtful: Vec::new() })
     }
 
-    /// Makes lamps share samples in blocks where a good part of the texels, [`PENUMBRA_SHARE`], lies in their penumbrae:
+    /// Makes lamps share samples in blocks of which a good part, see [`shares_penumbrae`], lies in penumbrae of any source:
     /// behind a grille, or among many thin blockers. The visible share of each texel by itself would take hundreds of
     /// rays, while smoothing makes use of the neighbours' samples. The light of these blocks is sampled again.
     pub fn share_penumbrae(
@@ -155,7 +155,7 @@ impl<'a> SourceSampler<'a> {
                 *in_penumbrae += u32::from(direct[texel.place()].seen.partly);
                 *all += 1;
             }
-            let shares = |[in_penumbrae, all]: &[u32; 2]| *in_penumbrae as f32 > PENUMBRA_SHARE * *all as f32;
+            let shares = |&[in_penumbrae, all]: &[u32; 2]| shares_penumbrae(in_penumbrae, all);
             lamps.retain(|(texel, _)| counts.get(&self.cuts.block(*texel)).is_some_and(shares));
             self.cuts.share(self.sources, &lamps);
             lamps
@@ -262,10 +262,19 @@ fn known_light(known: &[Option<Direct>], texel: CoveredTexel) -> Option<Direct> 
     known.get(texel.place()).copied().flatten()
 }
 
-/// The share of a block's texels that must lie in penumbrae for its lamps to share samples. The narrow penumbra of a
-/// single edge that crosses a block stays below it, so that it stays sharp. At half of the texels, the rest of them took
-/// a third of the time of a bake behind a grille, for an error no smaller.
-const PENUMBRA_SHARE: f32 = 0.2;
+/// Whether lamps share samples in a block of `all` texels, some of them in penumbrae.
+fn shares_penumbrae(in_penumbrae: u32, all: u32) -> bool {
+    let least_share = if in_penumbrae >= GOOD_PART { GOOD_PART_SHARE } else { 0.5 };
+    in_penumbrae as f32 > least_share * all as f32
+}
+
+/// So many texels in penumbrae can make use of each other's samples. Lamps share samples there if more than
+/// [`GOOD_PART_SHARE`] of a block's texels lies in penumbrae; if fewer do, as on a small box, it must be most of them.
+const GOOD_PART: u32 = 32;
+/// The narrow penumbra of a single edge that crosses a whole block takes less than this share of it, and so stays sharp.
+/// With a share of a half, the texels of the other blocks took a third of the time of a bake behind a grille, for an
+/// error no smaller.
+const GOOD_PART_SHARE: f32 = 0.2;
 
 /// How far around a texel that saw a penumbra others may be in it too, in texels.
 const REACH: u32 = 2;
@@ -303,6 +312,15 @@ mod tests {
     use crate::scene::laid_out::laid_out;
     use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
     use crate::texel_index::MapIndex;
+
+    #[test]
+    fn lamps_share_samples_where_a_good_part_of_a_block_is_in_penumbrae() {
+        assert!(shares_penumbrae(52, 256) && !shares_penumbrae(51, 256), "a fifth of a whole block");
+        assert!(!shares_penumbrae(31, 256), "the penumbra of one edge, less than two texels wide");
+        assert!(shares_penumbrae(32, 70) && !shares_penumbrae(31, 70), "most of a small block");
+        assert!(shares_penumbrae(11, 20) && !shares_penumbrae(10, 20));
+        assert!(!shares_penumbrae(0, 0));
+    }
 
     /// The sun's shadow of a plate ends on a triangle, whose chart covers the texels along its longest side only in
     /// part. The texels' light must be that of the covered part, and not of the few points that stand for it.

@@ -43,8 +43,8 @@ const MIN_ROUND: f64 = 0.15;
 /// Once the mean over the level reaches the requested error, the total number of rays may rise to this multiple of the
 /// quality's limit for the sake of views that do not: a level's brightest place hides what its rooms still need.
 const RAYS_FOR_VIEWS: f64 = 1.5;
-/// Direct light and the gather together may take this multiple of the quality's limit, so that a level whose direct
-/// light is simple gets more rays for its bounces, in the same time.
+/// Direct light and the gather together may take this multiple of the quality's limit: where direct light is simple, more
+/// rays go to the bounces.
 const WITH_DIRECT_LIGHT: f64 = 2.25;
 /// A round that adds a smaller fraction of the rays cast is not worth another smoothing either: while a round needs
 /// fewer, it aims at [`LOWER_TARGET`] of the squared error, down to [`LEAST_TARGET`] of what was requested.
@@ -204,6 +204,8 @@ struct RoundPlanner<'a> {
     mean_direct: f64,
     /// Per covered texel, by how much its reused light may have changed, W/m²; empty if nothing is reused.
     reuse_error: &'a [f32],
+    /// The texels whose samples are reused, and those samples, per replicate.
+    reused: [u64; 2],
     options: &'a BakeOptions,
 }
 
@@ -263,6 +265,7 @@ impl<'a> RoundPlanner<'a> {
             mean_direct: sum / open.len().max(1) as f64,
             open,
             reuse_error: reused.map_or(&[], |reused| &reused.reuse_error),
+            reused: reused.map_or([0; 2], |reused| [reused.count() as u64, all_samples(&reused.gathered)]),
             options,
         }
     }
@@ -270,6 +273,12 @@ impl<'a> RoundPlanner<'a> {
     /// Number of open texels; at least one, as it is divided by.
     fn count(&self) -> f64 {
         self.open.len().max(1) as f64
+    }
+
+    /// By how much the samples that are reused from a previous bake exceed the share of their texels in `limit`.
+    fn reused_excess(&self, limit: u64) -> u64 {
+        let [texels, samples] = self.reused;
+        samples.saturating_sub((limit as f64 * texels as f64 / self.count()) as u64)
     }
 
     /// The samples of the first round: the same number for every open texel for which nothing is reused.
@@ -337,14 +346,17 @@ impl<'a> RoundPlanner<'a> {
         let requested = self.options.error.powi(2);
         let is_whole_reached = error.relative <= self.options.error;
         let of_quality = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
-        let limit =
-            sample_limit(of_quality, self.direct.samples() / REPLICATES as u64, cast, is_whole_reached);
-        let budget = limit.saturating_sub(cast);
+        let of_direct_light = self.direct.samples() / REPLICATES as u64;
+        // The limit of a previous bake may have been higher. What its samples have cost beyond this one does not count.
+        let reused_excess = self.reused_excess(sample_limit(of_quality, of_direct_light, 0, false));
+        let counted = cast - reused_excess;
+        let limit = sample_limit(of_quality, of_direct_light, counted, is_whole_reached);
+        let budget = limit.saturating_sub(counted);
         let is_spent = (budget as f64) < MIN_ROUND * cast as f64;
         let missed = if is_whole_reached { error.in_worst_view } else { error.relative };
         let requested_over_left = requested / missed.powi(2).max(f64::MIN_POSITIVE);
         let worthwhile = (WORTHWHILE * cast as f64) as u64;
-        let for_small_step = limit.max(times(of_quality, SMALL_STEP_RAYS)).saturating_sub(cast);
+        let for_small_step = limit.max(times(of_quality, SMALL_STEP_RAYS)).saturating_sub(counted);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP && for_small_step >= worthwhile;
         let (first_target, budget) = match is_small_step {
             true => (SMALL_STEP_TARGET * requested_over_left, for_small_step),
@@ -396,7 +408,7 @@ impl<'a> RoundPlanner<'a> {
 fn sample_limit(of_quality: u64, of_direct_light: u64, cast: u64, is_whole_reached: bool) -> u64 {
     let left = times(of_quality, WITH_DIRECT_LIGHT).saturating_sub(of_direct_light);
     let limit = of_quality.max(left);
-    match is_whole_reached || cast > times(limit, SMALL_STEP_RAYS) {
+    match is_whole_reached || cast > times(of_quality, SMALL_STEP_RAYS).max(limit) {
         true => times(of_quality, RAYS_FOR_VIEWS).max(limit),
         false => limit,
     }
@@ -421,7 +433,10 @@ mod tests {
     fn views_get_half_as_many_samples_again_once_the_whole_level_has_its_error() {
         assert_eq!([0, 990, 1250].map(|cast| sample_limit(1000, 1250, cast, false)), [1000; 3]);
         assert_eq!([0, 990, 1400].map(|cast| sample_limit(1000, 1250, cast, true)), [1500; 3]);
-        assert_eq!(sample_limit(1000, 1250, 1400, false), 1500, "a limit that was raised stays so");
+        for of_direct_light in [800, 1000, 1250] {
+            let limit = sample_limit(1000, of_direct_light, 1490, false);
+            assert_eq!(limit, 1500, "a limit that was raised stays so: {of_direct_light}");
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ use crate::scene::Canonical;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
 /// The version of the format. Files of other versions are not read.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const CHECKSUM: usize = 32;
 /// Compression level of Zstandard: higher ones take longer and save no more.
 const LEVEL: i32 = 1;

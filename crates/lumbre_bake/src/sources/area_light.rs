@@ -159,7 +159,8 @@ impl Sources<'_> {
         let (mut visible, mut hidden) = (0u32, 0u32);
         let (mut batch_all, mut batch_seen) = ([0.0f32; BATCHES], [0.0f32; BATCHES]);
         for sample in 0..samples {
-            // A retry: where a single ray is wanted, the first sample that can bring light is enough.
+            // Where a single ray is wanted, the first sample that can bring light ends the search. Only a retry takes
+            // more than one.
             if sampled.samples == 1 && visible + hidden > 0 {
                 break;
             }
@@ -186,9 +187,11 @@ impl Sources<'_> {
         direct.rays += visible + hidden;
         direct.sampled = true;
         direct.seen.add(node, visible, hidden);
-        let fraction = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
-        let mean = Vec3::new(fraction(seen.x, all.x), fraction(seen.y, all.y), fraction(seen.z, all.z));
-        let all_channels = fraction(batch_seen.iter().sum(), batch_all.iter().sum());
+        let fraction = |seen: f32, all: f32, otherwise: f32| if all > 0.0 { seen / all } else { otherwise };
+        let all_channels = fraction(batch_seen.iter().sum(), batch_all.iter().sum(), 0.0);
+        // Few samples may have met none of the lamp's parts that shine in some channel.
+        let of_channel = |channel: usize| fraction(seen[channel], all[channel], all_channels);
+        let mean = Vec3::from_array(std::array::from_fn(of_channel));
         let batch_fractions = std::array::from_fn(|batch| match batch_all[batch] > 0.0 {
             true => batch_seen[batch] / batch_all[batch],
             false => all_channels,

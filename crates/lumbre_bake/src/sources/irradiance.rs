@@ -47,3 +47,63 @@ impl Sources<'_> {
         direct
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::Vec3;
+    use lumbre_mesh::shapes;
+
+    use crate::BakeOptions;
+    use crate::Density;
+    use crate::sampling::{Sequence, Stream};
+    use crate::scene::laid_out::laid_out;
+    use crate::scene::{PlacedPrimitive, Receiver, SceneObject, Side, StaticScene};
+    use crate::sources::{Emitter, Sources};
+
+    /// Faces of a lamp that is red, green and, on the side that faces away, blue.
+    fn lamp_of_three_colors() -> Vec<Emitter> {
+        let [a, b, c, d] =
+            [[0.0, 0.0], [0.0, 0.3], [0.3, 0.3], [0.3, 0.0]].map(|[x, z]| Vec3::new(x, 2.0, z));
+        let face = |corners: [Vec3; 3], normal: Vec3, radiance: Vec3| Emitter {
+            corners,
+            corners_f64: corners.map(|corner| corner.as_dvec3()),
+            normal,
+            area: 0.045,
+            radiance,
+            triangle: 0,
+            side: Side::Front,
+        };
+        vec![
+            face([c, b, a], Vec3::NEG_Y, Vec3::X),
+            face([d, c, a], Vec3::NEG_Y, Vec3::Y),
+            face([a, b, c], Vec3::Y, Vec3::Z),
+            face([a, c, d], Vec3::Y, Vec3::Z),
+        ]
+    }
+
+    /// Where nothing is hidden, a single ray gives the exact light in every channel, although it meets a face of only
+    /// one of the colours, and its first sample may meet a face that brings no light.
+    #[test]
+    fn one_ray_to_a_lamp_of_several_colors_gives_its_exact_light() {
+        let floor =
+            PlacedPrimitive { mesh: Arc::new(shapes::plane(2.0, 2.0, 1, 1)), ..PlacedPrimitive::default() };
+        let objects = vec![SceneObject::new("floor", vec![floor])];
+        let input = StaticScene { objects, ..StaticScene::default() }.checked().unwrap();
+        let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
+        let (_, scene) = laid_out(&input.objects, input.space(), &options);
+        let sources = Sources::new(&scene, lamp_of_three_colors(), Vec::new(), Vec3::ZERO);
+        let position = Vec3::new(0.1, 1.0, 0.0);
+        let receiver = Receiver { position, origin: position, geometric_normal: Vec3::Y, normal: Vec3::Y };
+        let root = sources.emitter_tree.root().unwrap();
+        let exact = sources.emitter_tree.unoccluded(&sources.emitters, root, &receiver);
+        assert!(exact.x > 0.01 && exact.y > 0.01 && exact.z == 0.0, "{exact}");
+        for number in 0..64 {
+            let sequence = Sequence::new(3, Stream::Test(93), number);
+            let light = sources.irradiance(sequence, 1, &|_, _| Some(receiver));
+            assert!(light.baked.distance(exact) < 1e-6 * exact.length(), "{number}: {} {exact}", light.baked);
+            assert_eq!(light.rays, 1, "{number}");
+        }
+    }
+}
