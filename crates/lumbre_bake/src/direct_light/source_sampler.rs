@@ -135,8 +135,8 @@ impl<'a> SourceSampler<'a> {
         Ok(IndividualLight { direct, samples: vec![usual; count], doubtful: Vec::new() })
     }
 
-    /// Makes lamps share samples in blocks of which a good part, see [`shares_penumbrae`], lies in penumbrae of any source:
-    /// behind a grille, or among many thin blockers. The visible share of each texel by itself would take hundreds of
+    /// Makes lamps share samples in blocks of which a good part lies in penumbrae of any source (see
+    /// [`shares_penumbrae`]): behind a grille, or among many thin blockers. The visible share of each texel by itself would take hundreds of
     /// rays, while smoothing makes use of the neighbours' samples. The light of these blocks is sampled again.
     pub fn share_penumbrae(
         &mut self,
@@ -262,19 +262,21 @@ fn known_light(known: &[Option<Direct>], texel: CoveredTexel) -> Option<Direct> 
     known.get(texel.place()).copied().flatten()
 }
 
-/// Whether lamps share samples in a block of `all` texels, some of them in penumbrae.
+/// Whether lamps share samples in a block of `all` texels, of which so many lie in penumbrae.
 fn shares_penumbrae(in_penumbrae: u32, all: u32) -> bool {
-    let least_share = if in_penumbrae >= GOOD_PART { GOOD_PART_SHARE } else { 0.5 };
+    let is_enough = in_penumbrae >= ENOUGH_IN_PENUMBRAE;
+    let least_share = if is_enough { PENUMBRA_SHARE } else { PENUMBRA_SHARE_OF_FEW };
     in_penumbrae as f32 > least_share * all as f32
 }
 
-/// So many texels in penumbrae can make use of each other's samples. Lamps share samples there if more than
-/// [`GOOD_PART_SHARE`] of a block's texels lies in penumbrae; if fewer do, as on a small box, it must be most of them.
-const GOOD_PART: u32 = 32;
-/// The narrow penumbra of a single edge that crosses a whole block takes less than this share of it, and so stays sharp.
-/// With a share of a half, the texels of the other blocks took a third of the time of a bake behind a grille, for an
-/// error no smaller.
-const GOOD_PART_SHARE: f32 = 0.2;
+/// So many texels in penumbrae are enough to smooth each other's samples.
+const ENOUGH_IN_PENUMBRAE: u32 = 32;
+/// The share of a block's texels, if they are enough. The narrow penumbra of a single edge that crosses a whole block
+/// takes less, and so stays sharp. With a share of a half, the texels of the other blocks took a third of the time of a
+/// bake behind a grille, for an error no smaller.
+const PENUMBRA_SHARE: f32 = 0.2;
+/// The same where they are fewer, as on a small box.
+const PENUMBRA_SHARE_OF_FEW: f32 = 0.5;
 
 /// How far around a texel that saw a penumbra others may be in it too, in texels.
 const REACH: u32 = 2;
