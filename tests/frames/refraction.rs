@@ -9,8 +9,8 @@ use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Fog, FogMode, Light, Material, Shading, Surface};
-use lumbre_render::FrameOptions;
-use lumbre_scene::{Camera, Medium, Mesh, SceneSettings, Transform};
+use lumbre_render::{FrameOptions, RenderingPath};
+use lumbre_scene::{Camera, Medium, Mesh, Projection, SceneSettings, Transform};
 use lumbre_trace::{TraceOptions, trace};
 
 use crate::adapter::{draw, linear};
@@ -199,12 +199,60 @@ fn a_pool_shows_nearly_what_the_ray_tree_shows() {
     assert!(against.opaque > 6.0 * against.mean, "{against:?}");
 }
 
+/// Light that is added pixel by pixel, where front faces have been drawn before, is that which is added triangle by
+/// triangle. A ray that passes an edge of the picture may end on either side of it.
+#[test]
+fn light_from_front_faces_is_that_of_the_triangles() {
+    let fog = Fog { mode: FogMode::Exponential { density: 0.1 }, color: Vec3::new(0.6, 0.5, 0.3) };
+    for (what, height, fog) in
+        [("perspective", None, None), ("parallel", Some(2.0), None), ("fog", None, Some(fog))]
+    {
+        let mut world = room();
+        ball(&mut world, Medium { fresnel: true, ..Medium::default() });
+        // One glass in front of another, and a mirrored one that no other overlaps.
+        let sheet = Medium { thin: true, fresnel: true, ..Medium::default() };
+        let front = Transform::from_xyz(0.3, 1.0, 1.6).with_rotation(DQuat::from_rotation_x(1.4));
+        world.spawn((Mesh(Arc::new(shapes::plane(0.5, 0.5, 8, 8))), glass(1.7), sheet, front));
+        let mut beside = Transform::from_xyz(-1.3, 0.5, 0.8);
+        beside.scale = DVec3::new(-0.4, 0.5, 0.4);
+        world.spawn((Mesh(Arc::new(shapes::uv_sphere(0.9, 64, 32))), glass(1.3), Medium::default(), beside));
+        world.resource_mut::<SceneSettings>().fog = fog;
+        if let Some(half_height) = height {
+            for mut camera in world.query::<&mut Camera>().iter_mut(&mut world) {
+                camera.projection = Projection::Orthographic {
+                    half_width: half_height * f64::from(WIDTH) / f64::from(HEIGHT),
+                    half_height,
+                    near: 0.1,
+                    far: 20.0,
+                };
+            }
+        }
+        let [forward, deferred] = [RenderingPath::Forward, RenderingPath::Deferred].map(|rendering_path| {
+            let (pixels, report) =
+                draw(&mut world, WIDTH, HEIGHT, &FrameOptions { rendering_path, ..options() });
+            let drawn = report.plan.running().any(|pass| pass == "front faces");
+            assert_eq!(drawn, rendering_path == RenderingPath::Deferred);
+            pixels
+        });
+        let (opaque, _) = draw(&mut world, WIDTH, HEIGHT, &FrameOptions { refraction: false, ..options() });
+        let (mut through, mut apart) = (0, 0);
+        for ((forward, deferred), opaque) in forward.iter().zip(&deferred).zip(&opaque) {
+            through += usize::from((*forward - *opaque).abs().max_element() > STEP);
+            apart += usize::from((*forward - *deferred).abs().max_element() > 0.1 * STEP);
+        }
+        println!("{what}: {apart} of {through} pixels differ by more than a tenth of a step");
+        assert!(through > 10_000 && apart * 500 < through, "{what}: {apart} of {through}");
+    }
+}
+
 #[test]
 fn a_frame_without_glass_in_sight_has_none_of_it() {
     let status = |world: &mut World, options: &FrameOptions| {
         let (pixels, report) = draw(world, WIDTH, HEIGHT, options);
         let passes: Vec<&str> = report.plan.running().collect();
-        let none = !passes.iter().any(|pass| ["behind", "back faces", "refraction"].contains(pass));
+        let none = !passes
+            .iter()
+            .any(|pass| ["behind", "back faces", "front faces", "refraction"].contains(pass));
         assert!(none, "{passes:?}");
         (pixels, format!("{:?}", report.plan.status("refractive surfaces").unwrap()))
     };

@@ -806,7 +806,14 @@ impl Renderer {
             let refractor = object.refractor.as_ref()?;
             let flat = object.planar_mirror.is_some();
             let data = RefractorData::new(refractor, (object.radius, flat), parallel, background);
-            Some(RefractorSurface { slot, thin: refractor.thin, mirrored: object.mirrored, data })
+            Some(RefractorSurface {
+                slot,
+                thin: refractor.thin,
+                mirrored: object.mirrored,
+                triangles: object.triangles,
+                window: view.window_of_box(object.center, object.half_size)?,
+                data,
+            })
         });
         surfaces.collect()
     }

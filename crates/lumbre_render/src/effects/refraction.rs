@@ -7,8 +7,12 @@
 //! ```text
 //!   frame so far ──► copies of its radiance and depths ──┐
 //!   back faces of bodies ──► normals and depths ─────────┼──► refraction: added to the refractive surfaces
-//!   reflections in flat surfaces (`mirrors`) ────────────┘
+//!   reflections in flat surfaces (`mirrors`) ────────────┤
+//!   [front faces ──► normals and objects] ───────────────┘
 //! ```
+//!
+//! Light is added triangle by triangle, or, where triangles are small for a software rasterizer, pixel by pixel:
+//! the visible front faces are drawn first, and each surface's light is added over its part of the frame.
 
 use std::collections::HashMap;
 
@@ -32,17 +36,24 @@ use crate::frame_scene::{FrameScene, SHAPE};
 use crate::pending::Pending;
 use crate::shader::{self, Feature};
 use crate::target::DEPTH_FORMAT;
-use crate::{FrameOptions, Gpu, RenderError};
+use crate::{FrameOptions, Gpu, RenderError, RenderingPath};
 
 /// Format of the octahedral normals of back faces.
 const BACK_NORMALS: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
 /// Where there is no back face: NO_DIRECTION of shaders/octahedral.wesl.
 const NO_DIRECTION: wgpu::Color = wgpu::Color { r: 2.0, g: 2.0, b: 0.0, a: 0.0 };
 
+/// Format of visible front faces: their objects and normals, packed by shaders/refraction.wesl.
+const FRONT_FACES: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
+/// A software rasterizer gains by light that is added pixel by pixel from this many triangles of a surface on. A pane
+/// fills its blocks of pixels anyway.
+const MANY_TRIANGLES: usize = 64;
+
 #[derive(Debug, Default)]
 pub(super) struct Refraction {
     /// Whether the scene has transmissive meshes, and whether refraction is switched on.
     called_for: [bool; 2],
+    path: RenderingPath,
     fog: Option<Feature>,
     /// The surfaces in view.
     surfaces: Vec<RefractorSurface>,
@@ -56,8 +67,10 @@ pub(super) struct Refraction {
 enum Key {
     /// Draws back faces of objects with this winding.
     BackFaces { mirrored: bool },
-    /// Adds the refracted and reflected light.
-    Surfaces { format: wgpu::TextureFormat, samples: u32, fog: Option<Feature> },
+    /// Draws the visible front faces.
+    FrontFaces,
+    /// Adds the refracted and reflected light, triangle by triangle or where front faces have been drawn.
+    Surfaces { format: wgpu::TextureFormat, samples: u32, fog: Option<Feature>, from_front_faces: bool },
 }
 
 /// The keys of a frame's pipelines.
@@ -65,19 +78,23 @@ enum Key {
 struct Keys {
     back_faces: [Key; 2],
     surfaces: Key,
+    /// Whether front faces are drawn, and light is added pixel by pixel.
+    from_front_faces: bool,
 }
 
 impl Keys {
-    fn of(frame: &FrameShape, fog: Option<Feature>) -> Self {
+    fn of(frame: &FrameShape, fog: Option<Feature>, from_front_faces: bool) -> Self {
         let (format, samples) = (frame.lit_format, frame.samples);
         Self {
             back_faces: [false, true].map(|mirrored| Key::BackFaces { mirrored }),
-            surfaces: Key::Surfaces { format, samples, fog },
+            surfaces: Key::Surfaces { format, samples, fog, from_front_faces },
+            from_front_faces,
         }
     }
 
-    fn all(&self) -> [Key; 3] {
-        [self.back_faces[0], self.back_faces[1], self.surfaces]
+    fn all(&self) -> impl Iterator<Item = Key> + use<> {
+        let front_faces = self.from_front_faces.then_some(Key::FrontFaces);
+        [self.back_faces[0], self.back_faces[1], self.surfaces].into_iter().chain(front_faces)
     }
 }
 
@@ -97,6 +114,8 @@ struct Layouts {
     view: wgpu::BindGroupLayout,
     /// A surface, and the pictures in which its rays are traced: with one sample per pixel and with several.
     surface: [wgpu::BindGroupLayout; 2],
+    /// The same with one sample per pixel, and the front faces.
+    front_faces: wgpu::BindGroupLayout,
 }
 
 /// The pictures in which rays are traced.
@@ -106,6 +125,8 @@ struct Pictures {
     behind_depth: TextureHandle,
     /// Normals and depths of back faces, if a body has some.
     back_faces: Option<[TextureHandle; 2]>,
+    /// The visible front faces, and the depths of the frame with them, if they have been drawn.
+    front_faces: Option<[TextureHandle; 2]>,
 }
 
 impl Effect for Refraction {
@@ -119,6 +140,7 @@ impl Effect for Refraction {
 
     fn extract(&mut self, _: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool {
         self.called_for = [facts.census.refractive > 0, options.refraction];
+        self.path = options.rendering_path;
         self.fog = facts.settings.fog.as_ref().map(|fog| fog_feature(&fog.mode));
         (self.surfaces, self.keys) = (Vec::new(), None);
         facts.refractive > 0
@@ -135,15 +157,24 @@ impl Effect for Refraction {
     fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
         let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
         let mut ready = true;
-        for key in Keys::of(frame, self.fog).all() {
-            ready &= device.pipeline(gpu, key, false)?;
+        // Which of them a frame uses depends on what is in sight.
+        let either = [false, true].map(|from_front_faces| Keys::of(frame, self.fog, from_front_faces));
+        for keys in either.iter().filter(|keys| {
+            !keys.from_front_faces || may_use_front_faces(gpu, frame.samples, self.path)
+        }) {
+            for key in keys.all() {
+                ready &= device.pipeline(gpu, key, false)?;
+            }
         }
         Ok(ready)
     }
 
     fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         self.surfaces.clone_from(&frame.refractors);
-        let keys = Keys::of(frame, self.fog);
+        let small = self.surfaces.iter().any(|surface| surface.triangles >= MANY_TRIANGLES);
+        let wanted = small || self.path == RenderingPath::Deferred;
+        let from_front_faces = wanted && may_use_front_faces(gpu, frame.samples, self.path);
+        let keys = Keys::of(frame, self.fog, from_front_faces);
         let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
         if !self.surfaces.is_empty() {
             for key in keys.all() {
@@ -178,6 +209,7 @@ impl Effect for Refraction {
         let mut behind_depth = graph.texture("depth behind", several);
         let mut back_normals = graph.texture("normals of back faces", described(BACK_NORMALS));
         let mut back_depth = graph.texture("depth of back faces", described(DEPTH_FORMAT));
+        let from_front_faces = self.keys.is_some_and(|keys| keys.from_front_faces);
         if in_scene && switched_on && in_sight {
             let copies = [(board.linear, behind), (board.depth, behind_depth)];
             graph
@@ -206,6 +238,15 @@ impl Effect for Refraction {
                 Ok(())
             });
         if in_scene && switched_on && in_sight {
+            let front_faces = from_front_faces.then(|| {
+                let mut front_faces = graph.texture("front faces", described(FRONT_FACES));
+                graph
+                    .raster_pass("front faces")
+                    .color(&mut front_faces, LoadOp::Clear(wgpu::Color::TRANSPARENT))
+                    .depth(&mut board.depth, LoadOp::Load)
+                    .run(move |context| self.draw_front_faces(context));
+                [front_faces, board.depth]
+            });
             let mirrored =
                 board.get::<MirrorPictures>().map(|pictures| pictures.0.clone()).unwrap_or_default();
             let mut pass =
@@ -214,12 +255,14 @@ impl Effect for Refraction {
             for picture in back_faces.iter().flatten() {
                 pass = pass.samples(picture);
             }
-            let pictures = Pictures { behind, behind_depth, back_faces };
-            for picture in mirrored.values() {
+            for picture in mirrored.values().chain(front_faces.iter().flatten()) {
                 pass = pass.samples(picture);
             }
-            pass.depth(&mut board.depth, LoadOp::Load)
-                .run(move |context| self.add_light(context, &pictures, &mirrored));
+            if front_faces.is_none() {
+                pass = pass.depth(&mut board.depth, LoadOp::Load);
+            }
+            let pictures = Pictures { behind, behind_depth, back_faces, front_faces };
+            pass.run(move |context| self.add_light(context, &pictures, &mirrored));
         }
     }
 }
@@ -238,13 +281,7 @@ impl Refraction {
             else {
                 continue;
             };
-            let Some(bound) = context.user.view_and_transforms(0) else { return Ok(()) };
-            let view = group(
-                context.resources.device,
-                "view of refraction",
-                &device.layouts.view,
-                &bound.map(wgpu::Buffer::as_entire_binding),
-            );
+            let Some(view) = device.view_group(context) else { return Ok(()) };
             context.pass.set_pipeline(pipeline);
             context.pass.set_bind_group(0, &view, &[]);
             for surface in
@@ -256,6 +293,17 @@ impl Refraction {
         Ok(())
     }
 
+    fn draw_front_faces(&self, context: &mut RasterContext<'_, FrameScene<'_>>) -> Result<(), EffectError> {
+        let Some((device, pipeline)) = self.pipeline(|_| Key::FrontFaces) else { return Ok(()) };
+        let Some(view) = device.view_group(context) else { return Ok(()) };
+        context.pass.set_pipeline(pipeline);
+        context.pass.set_bind_group(0, &view, &[]);
+        for surface in &self.surfaces {
+            context.user.draw_shape(context.pass, surface.slot, &SHAPE);
+        }
+        Ok(())
+    }
+
     fn add_light(
         &self,
         context: &mut RasterContext<'_, FrameScene<'_>>,
@@ -263,13 +311,7 @@ impl Refraction {
         mirrored: &HashMap<usize, TextureHandle>,
     ) -> Result<(), EffectError> {
         let Some((device, pipeline)) = self.pipeline(|keys| keys.surfaces) else { return Ok(()) };
-        let Some(bound) = context.user.view_and_transforms(0) else { return Ok(()) };
-        let view = group(
-            context.resources.device,
-            "view of refraction",
-            &device.layouts.view,
-            &bound.map(wgpu::Buffer::as_entire_binding),
-        );
+        let Some(view) = device.view_group(context) else { return Ok(()) };
         context.pass.set_pipeline(pipeline);
         context.pass.set_bind_group(0, &view, &[]);
         // Surfaces without a reflection picture search for their reflection in the frame so far.
@@ -281,10 +323,31 @@ impl Refraction {
             let Some(group) = own.as_ref().map_or(plain.as_ref(), Option::as_ref) else { continue };
             let offset = SurfaceUniforms::offset(2 * index + usize::from(picture.is_some()));
             context.pass.set_bind_group(1, group, &[offset]);
-            context.user.draw_shape(context.pass, surface.slot, &SHAPE);
+            if pictures.front_faces.is_none() {
+                context.user.draw_shape(context.pass, surface.slot, &SHAPE);
+            } else if let Ok(object) = u32::try_from(surface.slot) {
+                let [x, y, width, height] = surface.window.pixels(context.user.size);
+                context.pass.set_scissor_rect(x, y, width, height);
+                context.pass.draw(0..3, object..object + 1);
+            }
+        }
+        if pictures.front_faces.is_some() {
+            let [width, height] = context.user.size;
+            context.pass.set_scissor_rect(0, 0, width, height);
         }
         Ok(())
     }
+}
+
+/// Returns true if light may be added pixel by pixel: on a device that gains by it, or where the options ask for
+/// deferred shading. Front faces are drawn with one sample per pixel.
+fn may_use_front_faces(gpu: &Gpu, samples: u32, path: RenderingPath) -> bool {
+    let allowed = match path {
+        RenderingPath::Forward => false,
+        RenderingPath::Deferred => true,
+        RenderingPath::Auto => gpu.is_software(),
+    };
+    allowed && samples == 1
 }
 
 /// Copies whole textures to others of the same size.
@@ -342,6 +405,12 @@ impl OnDevice {
         Ok(pipeline.is_there(wait)?)
     }
 
+    /// Returns group 0: the camera's view and the objects.
+    fn view_group(&self, context: &RasterContext<'_, FrameScene<'_>>) -> Option<wgpu::BindGroup> {
+        let bound = context.user.view_and_transforms(0)?.map(wgpu::Buffer::as_entire_binding);
+        Some(group(context.resources.device, "view of refraction", &self.layouts.view, &bound))
+    }
+
     fn surface_group(
         &self,
         resources: &PassResources<'_>,
@@ -357,7 +426,7 @@ impl OnDevice {
         let [normals, depths] = back_faces.map(wgpu::BindingResource::TextureView);
         let picture = |handle| view(handle).map(wgpu::BindingResource::TextureView);
         let several = resources.texture(&pictures.behind_depth)?.sample_count() > 1;
-        let bound = [
+        let mut bound = vec![
             surface,
             picture(&pictures.behind)?,
             picture(&pictures.behind_depth)?,
@@ -365,7 +434,13 @@ impl OnDevice {
             depths,
             picture(mirrored)?,
         ];
-        let layout = &self.layouts.surface[usize::from(several)];
+        let mut layout = &self.layouts.surface[usize::from(several)];
+        if let Some(front_faces) = &pictures.front_faces {
+            layout = &self.layouts.front_faces;
+            for faces in front_faces {
+                bound.push(picture(faces)?);
+            }
+        }
         Ok(Some(group(resources.device, "refraction", layout, &bound)))
     }
 }
@@ -399,13 +474,16 @@ impl Layouts {
         let uniform = |dynamic| buffer(wgpu::BufferBindingType::Uniform, dynamic);
         let transforms = buffer(wgpu::BufferBindingType::Storage { read_only: true }, false);
         let depth = |multisampled| texture(wgpu::TextureSampleType::Depth, multisampled);
+        let surface = |several| {
+            let pictures = [color(), depth(several), color(), depth(false), color()];
+            [uniform(true)].into_iter().chain(pictures).map(|ty| (fragment, ty)).collect::<Vec<_>>()
+        };
+        let words = texture(wgpu::TextureSampleType::Uint, false);
+        let front_faces = [(fragment, words), (fragment, depth(false))];
         Self {
             view: layout("view of refraction", &[(vertex | fragment, uniform(false)), (vertex, transforms)]),
-            surface: [false, true].map(|several| {
-                let pictures = [color(), depth(several), color(), depth(false), color()];
-                let all = [uniform(true)].into_iter().chain(pictures);
-                layout("refraction", &all.map(|ty| (fragment, ty)).collect::<Vec<_>>())
-            }),
+            surface: [false, true].map(|several| layout("refraction", &surface(several))),
+            front_faces: layout("refraction of front faces", &[surface(false), front_faces.to_vec()].concat()),
         }
     }
 }
@@ -428,22 +506,32 @@ fn make(device: &wgpu::Device, layouts: &Layouts, key: Key) -> Result<wgpu::Rend
     let add = Some(wgpu::BlendState { color: add, alpha: add });
     let mut primitive = wgpu::PrimitiveState::default();
     let mut samples = 1;
-    let (entry, fog, groups, target, depth_stencil) = match key {
+    let mut fog = None;
+    let mut front_faces = false;
+    let (entry, groups, target, depth_stencil) = match key {
         Key::BackFaces { mirrored } => {
             primitive.front_face = if mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw };
             primitive.cull_mode = Some(wgpu::Face::Front);
             let nearest = depth(true, wgpu::CompareFunction::Greater);
-            ("back_face", None, vec![Some(&layouts.view)], target(BACK_NORMALS, None), nearest)
+            ("back_face", vec![Some(&layouts.view)], target(BACK_NORMALS, None), Some(nearest))
         }
-        Key::Surfaces { format, samples: several, fog } => {
-            samples = several;
+        Key::FrontFaces => {
             let here = depth(false, wgpu::CompareFunction::Equal);
-            let layouts = vec![Some(&layouts.view), Some(&layouts.surface[usize::from(several > 1)])];
-            ("fragment", fog, layouts, target(format, add), here)
+            ("front_face", vec![Some(&layouts.view)], target(FRONT_FACES, None), Some(here))
+        }
+        Key::Surfaces { format, samples: several, fog: of_scene, from_front_faces } => {
+            (samples, fog, front_faces) = (several, of_scene, from_front_faces);
+            let here = depth(false, wgpu::CompareFunction::Equal);
+            let surface = match from_front_faces {
+                true => &layouts.front_faces,
+                false => &layouts.surface[usize::from(several > 1)],
+            };
+            let groups = vec![Some(&layouts.view), Some(surface)];
+            ("fragment", groups, target(format, add), (!from_front_faces).then_some(here))
         }
     };
     let mut flags = fog_flags(fog);
-    flags.push(("MULTISAMPLED", samples > 1));
+    flags.extend([("MULTISAMPLED", samples > 1), ("FRONT_FACES", front_faces)]);
     let module = shader::compile(device, "refraction", &flags)?;
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("refraction"),
@@ -466,12 +554,12 @@ fn make(device: &wgpu::Device, layouts: &Layouts, key: Key) -> Result<wgpu::Rend
         layout: Some(&pipeline_layout),
         vertex: wgpu::VertexState {
             module: &module,
-            entry_point: Some("vertex"),
+            entry_point: Some(if front_faces { "whole_frame" } else { "vertex" }),
             compilation_options: Default::default(),
-            buffers: &shape,
+            buffers: if front_faces { &[] } else { &shape },
         },
         primitive,
-        depth_stencil: Some(depth_stencil),
+        depth_stencil,
         multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
         fragment: Some(wgpu::FragmentState {
             module: &module,

@@ -6,6 +6,7 @@ use glam::Vec3;
 use lumbre_optics::Material;
 use lumbre_scene::Medium;
 
+use super::camera::Window;
 use crate::layout::{coefficient, finite};
 
 /// The optical properties from an object's material and medium.
@@ -55,6 +56,10 @@ pub(crate) struct RefractorSurface {
     pub thin: bool,
     /// Its transform mirrors, so its triangles have the opposite winding.
     pub mirrored: bool,
+    /// Number of triangles of its mesh.
+    pub triangles: usize,
+    /// A part of the frame that contains it.
+    pub window: Window,
     pub data: RefractorData,
 }
 
