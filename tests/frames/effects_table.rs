@@ -711,6 +711,7 @@ const NO_SCENE: &[(&str, &str)] = &[
     ("DISPLAY", "that the display is folded in, with a tone curve, a clamp or neither"),
     ("VIEWPORT", "frames in a part of their target: `display`'s tests"),
     ("MULTISAMPLED", "depths of several samples behind glass: `refraction`'s tests"),
+    ("FRONT_FACES", "light through glass, pixel by pixel on software rasterizers: `refraction`'s tests"),
     ("G_BUFFER_DETAILS", "what the G-buffer holds of lightmaps and textures: `rendering_paths`' tests"),
     ("TABLES_IN_TEXTURES", "of the device: where a processor draws"),
     (

@@ -4,7 +4,6 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::DVec3;
 use lumbre_optics::{ErrorBound, Shading};
 use lumbre_scene::{ObjectTraits, SceneSettings};
 
@@ -131,10 +130,12 @@ impl<'a> VisibleObjects<'a> {
         need: &mut ChooseShading<'_>,
     ) -> Self {
         let mut seen = Self::default();
-        let planes = view.frustum(objects.origin);
+        let planes = view.frustum(objects.origin).map(|plane| (plane, plane.truncate().abs()));
         let inside = |object: &Object| {
             let center = (object.center - objects.origin).extend(1.0);
-            planes.iter().all(|plane| plane.dot(center) >= -object.radius)
+            planes.iter().all(|(plane, slopes)| {
+                plane.dot(center) >= -object.radius.min(slopes.dot(object.half_size))
+            })
         };
         // Most objects have the same traits as the previous one, so its variant is kept.
         let mut known: Option<(ObjectTraits, Shading, Variant)> = None;
@@ -210,7 +211,7 @@ impl<'a> VisibleObjects<'a> {
             seen.visible.push(Visible {
                 pass,
                 slot: number(slot),
-                order: order(object, view.eye, pass),
+                order: order(object, view, pass),
                 object,
                 mesh: object.mesh,
                 texture_set: object.texture_set.as_ref(),
@@ -410,15 +411,18 @@ fn sort_key(deferred: bool, pass: LitPass, order: f64, number: u32) -> u128 {
     kind << 96 | u128::from(order) << 32 | u128::from(number)
 }
 
-/// Returns the value that the objects of a pass are sorted by. For opaque objects, this is the distance from
-/// the eye to the farthest point of the bounding sphere, because a room or a floor lies behind what it
-/// contains. For transparent ones, it is the negative distance to the nearest point, so that the farthest
-/// object comes first.
-fn order(object: &Object, eye: DVec3, pass: LitPass) -> f64 {
-    let center = (object.center - eye).length();
+/// Returns the value that the objects of a pass are sorted by. For opaque objects, this is the depth of the
+/// farthest point of the bounding box, because a room or a floor lies behind what it contains, and a wall that
+/// faces the viewer hides what is behind it, however wide it is. For transparent ones, it is the negative
+/// distance to the nearest point of the bounding sphere, so that the farthest object comes first.
+fn order(object: &Object, view: &CameraView, pass: LitPass) -> f64 {
+    let from_eye = object.center - view.eye;
     match pass {
-        LitPass::Transparent => -(center - object.radius).max(0.0),
-        LitPass::Lightmap | LitPass::Forward | LitPass::Refraction => center + object.radius,
+        LitPass::Transparent => -(from_eye.length() - object.radius).max(0.0),
+        LitPass::Lightmap | LitPass::Forward | LitPass::Refraction => {
+            let backward = view.basis.z_axis;
+            object.half_size.dot(backward.abs()) - from_eye.dot(backward)
+        }
     }
 }
 
