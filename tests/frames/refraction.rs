@@ -250,9 +250,8 @@ fn a_frame_without_glass_in_sight_has_none_of_it() {
     let status = |world: &mut World, options: &FrameOptions| {
         let (pixels, report) = draw(world, WIDTH, HEIGHT, options);
         let passes: Vec<&str> = report.plan.running().collect();
-        let none = !passes
-            .iter()
-            .any(|pass| ["behind", "back faces", "front faces", "refraction"].contains(pass));
+        let none =
+            !passes.iter().any(|pass| ["behind", "back faces", "front faces", "refraction"].contains(pass));
         assert!(none, "{passes:?}");
         (pixels, format!("{:?}", report.plan.status("refractive surfaces").unwrap()))
     };

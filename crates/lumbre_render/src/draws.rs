@@ -133,9 +133,9 @@ impl<'a> VisibleObjects<'a> {
         let planes = view.frustum(objects.origin).map(|plane| (plane, plane.truncate().abs()));
         let inside = |object: &Object| {
             let center = (object.center - objects.origin).extend(1.0);
-            planes.iter().all(|(plane, slopes)| {
-                plane.dot(center) >= -object.radius.min(slopes.dot(object.half_size))
-            })
+            planes
+                .iter()
+                .all(|(plane, slopes)| plane.dot(center) >= -object.radius.min(slopes.dot(object.half_size)))
         };
         // Most objects have the same traits as the previous one, so its variant is kept.
         let mut known: Option<(ObjectTraits, Shading, Variant)> = None;

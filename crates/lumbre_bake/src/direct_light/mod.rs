@@ -84,7 +84,7 @@ pub(crate) fn direct_light(
         let [_, many, most] = options.effort().direct;
         sampler.sample(&light.with_fewer_samples(many), &mut light, monitor)?;
         let begun = monitor.seconds();
-        sampler.refine(&mut light, &local, most, goals.individual, monitor)?;
+        sampler.refine(&mut light, &local, most, (goals.individual, goals.individual_enough), monitor)?;
         if let Some(shared) = &mut shared {
             shared.refine(&local, &goals, light.variance_left(&local), monitor)?;
         }

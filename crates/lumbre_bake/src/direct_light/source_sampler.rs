@@ -208,19 +208,22 @@ impl<'a> SourceSampler<'a> {
 
     /// Takes more samples of doubtful texels, up to `most`, mostly at the edges of shadows, until the sum of squared
     /// errors is down to `goal` and in every view their mean to that of the goal, no texel can have more, or the time is
-    /// up.
+    /// up. After a round of many samples `enough` is enough, which is at least the goal.
     pub fn refine(
         &self,
         light: &mut IndividualLight,
         local: &LocalLight,
         most: u32,
-        goal: f64,
+        (goal, enough): (f64, f64),
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
+        let many = MANY_SAMPLES * self.unknown().count() as u64;
+        let mut samples_of_round = 0;
         loop {
             let variances = light.relative_variances(local);
             let errors = ErrorsInViews::new(&local.views, &variances);
-            if errors.sums().into_iter().all(|sum| sum <= goal) {
+            let limit = if samples_of_round > many { enough } else { goal };
+            if errors.sums().into_iter().all(|sum| sum <= limit) {
                 return Ok(());
             }
             let (texels, samples) = (&light.doubtful, &light.samples);
@@ -228,6 +231,7 @@ impl<'a> SourceSampler<'a> {
             let allocator =
                 SampleAllocator { texels, variances: &goal.variances, samples, most, order: ORDER };
             let allocated = allocator.reach(goal.sum);
+            samples_of_round = allocated.iter().map(|to| u64::from(to.samples)).sum();
             if self.sample(&allocated, light, monitor)? == 0 {
                 return Ok(());
             }
@@ -283,6 +287,11 @@ const REACH: u32 = 2;
 
 /// The power of the number of samples with which the variance falls at straight edges of shadows, as measured.
 pub(crate) const ORDER: f64 = 1.5;
+
+/// So many samples per texel of the level are many for one round. A round that takes them and misses its goal has found
+/// sharp edges of shadows among thin blockers, where samples are worth less than at straight edges: behind a grille, a
+/// second such round took an eighth of the bake and lowered the squared error from 1.7 to 1.6 times the goal.
+const MANY_SAMPLES: u64 = 16;
 
 /// The least share of a squared error that a pass aims to leave: about what the most doublings of samples in one pass
 /// leave.

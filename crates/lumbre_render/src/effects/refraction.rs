@@ -159,9 +159,10 @@ impl Effect for Refraction {
         let mut ready = true;
         // Which of them a frame uses depends on what is in sight.
         let either = [false, true].map(|from_front_faces| Keys::of(frame, self.fog, from_front_faces));
-        for keys in either.iter().filter(|keys| {
-            !keys.from_front_faces || may_use_front_faces(gpu, frame.samples, self.path)
-        }) {
+        for keys in either
+            .iter()
+            .filter(|keys| !keys.from_front_faces || may_use_front_faces(gpu, frame.samples, self.path))
+        {
             for key in keys.all() {
                 ready &= device.pipeline(gpu, key, false)?;
             }
@@ -483,7 +484,10 @@ impl Layouts {
         Self {
             view: layout("view of refraction", &[(vertex | fragment, uniform(false)), (vertex, transforms)]),
             surface: [false, true].map(|several| layout("refraction", &surface(several))),
-            front_faces: layout("refraction of front faces", &[surface(false), front_faces.to_vec()].concat()),
+            front_faces: layout(
+                "refraction of front faces",
+                &[surface(false), front_faces.to_vec()].concat(),
+            ),
         }
     }
 }
