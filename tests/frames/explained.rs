@@ -80,6 +80,7 @@ fn random_material(random: &mut Random) -> Material {
             AlphaMode::Mask { cutoff: 0.5 },
             AlphaMode::Blend,
         ]),
+        transmission: if random.once_in(6) { Vec3::splat(0.5) } else { Vec3::ZERO },
         double_sided: random.once_in(3),
         unlit: random.once_in(6),
         distribution: random.one_of(&[Distribution::default(), Distribution::Gaussian]),

@@ -2,10 +2,10 @@
 //! the same scene: with every kind of light list, every kind of light, and every rate of shading.
 
 use bevy_ecs::prelude::*;
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, Material, ReflectionModel, Shading, SpotCone};
-use lumbre_render::{FrameOptions, LightCount, LightLists, Measure};
+use lumbre_render::{FrameOptions, LightCount, LightLists, Measure, RenderingPath};
 use lumbre_scene::{
     Camera, EmissiveLight, Lightmap, LightmapEncoding, LightmapImage, Mesh, Projection, SceneSettings,
     Transform,
@@ -104,6 +104,33 @@ fn counted(world: &mut World, options: &FrameOptions) -> [LightCount; 3] {
             .all(|pass| pass.lights.unwrap_or_default() == LightCount::default())
     );
     counts
+}
+
+/// A wide wall that faces the viewer is drawn before what it hides, although its bounding sphere reaches farther back.
+/// What stands beside the view is left out, although its bounding sphere reaches into it.
+#[test]
+fn what_a_wide_wall_hides_is_not_lit() {
+    let (mut world, _) = wall(glossy());
+    lamps(&mut world, 20.0);
+    let options = FrameOptions {
+        rendering_path: RenderingPath::Forward,
+        ..counting(LightLists::Clusters, Shading::Phong)
+    };
+    let [_, alone, _] = counted(&mut world, &options);
+    for x in -1..=1 {
+        let place = Transform::from_xyz(f64::from(x), 0.2, -2.0);
+        world.spawn((Mesh::from(shapes::uv_sphere(0.4, 16, 8)), glossy(), place));
+    }
+    let [_, with_balls, _] = counted(&mut world, &options);
+    assert!(alone.tested > 0);
+    assert_eq!((with_balls.tested, with_balls.contributing), (alone.tested, alone.contributing));
+
+    // To the right of the view, along it.
+    let beside = Transform::from_xyz(12.0, 0.0, 0.0).looking_at(DVec3::new(13.0, 0.0, 0.0), DVec3::Y);
+    let beside = beside.with_rotation(beside.rotation * DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2));
+    world.spawn((Mesh::from(shapes::plane(20.0, 20.0, 1, 1)), glossy(), beside));
+    let (_, report) = Canvas::new(WIDTH, HEIGHT).draw(&mut world, &linear());
+    assert_eq!((report.statistics.objects, report.statistics.objects_outside), (4, 1));
 }
 
 /// Returns the smallest and largest number of contributions, given the rounding of f32.

@@ -13,7 +13,7 @@ use lumbre_render::{FrameOptions, RenderingPath};
 use lumbre_scene::{Camera, Medium, Mesh, Projection, SceneSettings, Transform};
 use lumbre_trace::{TraceOptions, trace};
 
-use crate::adapter::{draw, linear};
+use crate::adapter::{draw, gpu, linear};
 
 const WIDTH: u32 = 384;
 const HEIGHT: u32 = 288;
@@ -204,9 +204,13 @@ fn a_pool_shows_nearly_what_the_ray_tree_shows() {
 #[test]
 fn light_from_front_faces_is_that_of_the_triangles() {
     let fog = Fog { mode: FogMode::Exponential { density: 0.1 }, color: Vec3::new(0.6, 0.5, 0.3) };
-    for (what, height, fog) in
-        [("perspective", None, None), ("parallel", Some(2.0), None), ("fog", None, Some(fog))]
-    {
+    for (what, height, fog, origin, eye) in [
+        ("perspective", None, None, 0.0, 3.5),
+        ("parallel", Some(2.0), None, 0.0, 3.5),
+        ("fog", None, Some(fog), 0.0, 3.5),
+        ("a kilometre from the origin", None, None, 1000.0, 3.5),
+        ("the ball begins before the near plane", None, None, 0.0, 1.2),
+    ] {
         let mut world = room();
         ball(&mut world, Medium { fresnel: true, ..Medium::default() });
         // One glass in front of another, and a mirrored one that no other overlaps.
@@ -217,6 +221,16 @@ fn light_from_front_faces_is_that_of_the_triangles() {
         beside.scale = DVec3::new(-0.4, 0.5, 0.4);
         world.spawn((Mesh(Arc::new(shapes::uv_sphere(0.9, 64, 32))), glass(1.3), Medium::default(), beside));
         world.resource_mut::<SceneSettings>().fog = fog;
+        for (camera, mut place) in world.query::<(Has<Camera>, &mut Transform)>().iter_mut(&mut world) {
+            if camera {
+                place.translation.z = eye;
+            }
+            place.translation += DVec3::splat(origin);
+        }
+        for mut camera in world.query::<&mut Camera>().iter_mut(&mut world) {
+            camera.projection =
+                Projection::Perspective { vertical_fov: 0.9, aspect: None, near: 0.3, far: None };
+        }
         if let Some(half_height) = height {
             for mut camera in world.query::<&mut Camera>().iter_mut(&mut world) {
                 camera.projection = Projection::Orthographic {
@@ -243,6 +257,28 @@ fn light_from_front_faces_is_that_of_the_triangles() {
         println!("{what}: {apart} of {through} pixels differ by more than a tenth of a step");
         assert!(through > 10_000 && apart * 500 < through, "{what}: {apart} of {through}");
     }
+}
+
+/// Software rasterizers add light pixel by pixel where surfaces have many triangles and pixels one sample.
+#[test]
+fn front_faces_are_drawn_where_triangles_are_many() {
+    let front_faces = |world: &mut World, options: FrameOptions| {
+        draw(world, WIDTH, HEIGHT, &options).1.plan.running().any(|pass| pass == "front faces")
+    };
+    let software = gpu().is_software();
+    let mut world = room();
+    ball(&mut world, Medium::default());
+    assert_eq!(front_faces(&mut world, options()), software);
+    let several = FrameOptions { multisample: Some(true), ..options() };
+    assert!(!front_faces(&mut world, FrameOptions { rendering_path: RenderingPath::Deferred, ..several }));
+    let mut world = room();
+    world.spawn((
+        Mesh(Arc::new(shapes::plane(1.6, 1.4, 2, 2))),
+        glass(1.5),
+        Medium::default(),
+        Transform::from_xyz(0.0, 1.0, 0.5).with_rotation(DQuat::from_rotation_x(1.4)),
+    ));
+    assert!(!front_faces(&mut world, options()));
 }
 
 #[test]

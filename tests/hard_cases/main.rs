@@ -75,7 +75,7 @@ const ROWS: [(&str, &str); 19] = [
     ),
     (
         "depth: near 1e-3, far 1e6; coplanar faces",
-        "Reversed-Z in f32, infinitely far: planes a millionth of their distance apart are told apart from 2 mm to 1000 km. Of fragments equally far the one drawn last is seen; objects are drawn nearest first (by bounding spheres), as near ones in the order of their making.",
+        "Reversed-Z in f32, infinitely far: planes a millionth of their distance apart are told apart from 2 mm to 1000 km. Of fragments equally far the one drawn last is seen; objects are drawn nearest first (by the farthest depth of their boxes, then the smaller ones), as near ones in the order of their making.",
     ),
     (
         "world at 10^5 to 10^7 m from the origin",

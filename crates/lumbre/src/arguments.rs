@@ -567,7 +567,8 @@ pub struct Frame {
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     pub specular_antialiasing: Option<bool>,
     /// Light opaque surfaces as they are drawn (forward) or afterwards from a G-buffer (deferred). auto (the
-    /// default) chooses deferred where many lights meet small triangles. The picture is the same.
+    /// default) chooses deferred where many lights meet small triangles. The picture is the same but for a few pixels
+    /// of glass.
     #[arg(long, value_name = "auto|forward|deferred", value_parser = rendering_path)]
     pub rendering_path: Option<RenderingPath>,
     /// Conversion from radiance to pixel values: srgb for viewing (the default for PNG), linear for unchanged

@@ -1,5 +1,5 @@
 //! From radiance to display values: the tone curve and sRGB's encoding. Exposure is a factor that is applied
-//! before. Twin: shaders/tone_curve.wesl.
+//! before. Twin: shaders/tone_curve.wesl, where a polynomial stands for the power of the encoding.
 
 use std::sync::LazyLock;
 

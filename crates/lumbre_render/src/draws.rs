@@ -130,12 +130,10 @@ impl<'a> VisibleObjects<'a> {
         need: &mut ChooseShading<'_>,
     ) -> Self {
         let mut seen = Self::default();
-        let planes = view.frustum(objects.origin).map(|plane| (plane, plane.truncate().abs()));
+        let planes = view.frustum(objects.origin);
         let inside = |object: &Object| {
             let center = (object.center - objects.origin).extend(1.0);
-            planes
-                .iter()
-                .all(|(plane, slopes)| plane.dot(center) >= -object.radius.min(slopes.dot(object.half_size)))
+            planes.iter().all(|plane| plane.dot(center) >= -object.reach(*plane))
         };
         // Most objects have the same traits as the previous one, so its variant is kept.
         let mut known: Option<(ObjectTraits, Shading, Variant)> = None;
@@ -401,6 +399,9 @@ fn same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
     }
 }
 
+/// The part of its radius by which an object counts as farther away. It decides where depths are equal.
+const TIE: f64 = 1e-6;
+
 /// Returns a key that sorts deferred objects first, then by pass, by order and by index, which the
 /// key ends in. Sorting keys is faster than moving the objects themselves, which are large.
 fn sort_key(deferred: bool, pass: LitPass, order: f64, number: u32) -> u128 {
@@ -413,15 +414,17 @@ fn sort_key(deferred: bool, pass: LitPass, order: f64, number: u32) -> u128 {
 
 /// Returns the value that the objects of a pass are sorted by. For opaque objects, this is the depth of the
 /// farthest point of the bounding box, because a room or a floor lies behind what it contains, and a wall that
-/// faces the viewer hides what is behind it, however wide it is. For transparent ones, it is the negative
-/// distance to the nearest point of the bounding sphere, so that the farthest object comes first.
+/// faces the viewer hides what is behind it, however wide it is. Of two boxes that end equally far, the larger
+/// one is behind, so that the order of a picture and the wall in whose plane it hangs does not change when the
+/// viewer turns. For transparent objects, it is the negative distance to the nearest point of the bounding
+/// sphere, so that the farthest object comes first.
 fn order(object: &Object, view: &CameraView, pass: LitPass) -> f64 {
     let from_eye = object.center - view.eye;
     match pass {
         LitPass::Transparent => -(from_eye.length() - object.radius).max(0.0),
         LitPass::Lightmap | LitPass::Forward | LitPass::Refraction => {
             let backward = view.basis.z_axis;
-            object.half_size.dot(backward.abs()) - from_eye.dot(backward)
+            object.half_size.dot(backward.abs()) - from_eye.dot(backward) + TIE * object.radius
         }
     }
 }

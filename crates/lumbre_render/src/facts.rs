@@ -9,7 +9,7 @@ use lumbre_scene::{Census, ObjectCensus, SceneSettings};
 use crate::FrameOptions;
 use crate::extract::LightSet;
 use crate::g_buffer::GBufferContents;
-use crate::rendering_path::ChosenPath;
+use crate::rendering_path::{self, ChosenPath};
 
 /// The facts about a scene and the options of its frame.
 #[derive(Clone, Debug)]
@@ -35,6 +35,8 @@ pub struct SceneFacts {
     pub samples: u32,
     /// Whether opaque surfaces are lit forward or deferred.
     pub(crate) path: ChosenPath,
+    /// Whether refracted light is added pixel by pixel instead of triangle by triangle.
+    pub(crate) refracts_by_pixel: bool,
     /// The contents of the G-buffer, if the frame is shaded deferred.
     pub(crate) g_buffer: Option<GBufferContents>,
     /// The scene's settings: ambient light, fog, background, rates of evaluation.
@@ -71,6 +73,7 @@ impl SceneFacts {
             shadow_lights: lights.every.shadows.lights,
             samples,
             path,
+            refracts_by_pixel: rendering_path::refracts_by_pixel(options, objects, (samples, software)),
             g_buffer: path.is_deferred().then_some(GBufferContents { details }),
             settings: *settings,
         }

@@ -269,9 +269,11 @@ fn useful_features(adapter: &wgpu::Adapter) -> wgpu::Features {
 
 /// Makes glibc keep memory that is freed, instead of giving it back to the system and asking for it again. llvmpipe
 /// allocates the vertices of every draw, and without this a frame of 64 balls spends .04 of its time on page faults.
-/// glibc raises its limits to the size of the largest block that it has freed
-/// (`M_MMAP_THRESHOLD` and `M_TRIM_THRESHOLD` in mallopt(3)), so that freeing one is enough; the pages of this one are
-/// never touched. Other allocators are not affected.
+/// When glibc frees a block that it had mapped by itself, it takes the block's size for the least that it maps so, and twice
+/// that for the most that it keeps free (`M_MMAP_THRESHOLD` and `M_TRIM_THRESHOLD` in mallopt(3)); so freeing one of
+/// 24 MiB is enough, and the pages of this one are never touched. That holds for the whole process, which then keeps up
+/// to 48 MiB per heap. On 32-bit systems the block is too large to count, and where Rust does not allocate by glibc nothing
+/// changes.
 fn keep_freed_memory() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(24 << 20)));
 }

@@ -140,7 +140,7 @@ fn seen_planes(
     for (slot, object) in objects.iter() {
         let Some(mirror) = object.planar_mirror.filter(|_| !own.contains(&slot)) else { continue };
         let center = (object.center - objects.origin).extend(1.0);
-        if frustum.iter().any(|plane| plane.dot(center) < -reach(object, plane)) {
+        if frustum.iter().any(|plane| plane.dot(center) < -object.reach(*plane)) {
             continue;
         }
         let Some((plane, front)) = mirror.facing(view.viewer()) else { continue };
@@ -163,11 +163,6 @@ fn seen_planes(
         }
     }
     planes
-}
-
-/// Returns how far an object's box extends from its centre along the normal of a plane.
-fn reach(object: &Object, plane: &DVec4) -> f64 {
-    plane.truncate().abs().dot(object.half_size)
 }
 
 /// Returns true if a mirror of this object with plane `b` lies in plane `a`.

@@ -84,23 +84,25 @@ pub enum LightLists {
 }
 
 /// Whether surfaces are lit while they are drawn (forward) or after all of them have been drawn (deferred).
-/// The picture is the same up to rounding, except where a forward-lit and a deferred surface are coplanar.
+/// The picture is the same up to rounding, except where a forward-lit and a deferred surface are coplanar, and in a few
+/// pixels of glass whose refracted rays pass an edge of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum RenderingPath {
     /// Deferred if many lights meet small triangles and no lightmaps: on a software rasterizer with at least 64
     /// lights that fragments find by clusters and one triangle for every 16 pixels of the frame, on a GPU with
     /// 1024 lights and a triangle for every 32 pixels. Otherwise forward. Whole blocks of pixels are shaded for
-    /// each triangle, and a small triangle fills little of a block.
+    /// each triangle, and a small triangle fills little of a block. For the same reason a software rasterizer adds
+    /// refracted light pixel by pixel if refractive surfaces have 64 triangles or more, on average.
     #[default]
     Auto,
-    /// Each surface is lit while it is drawn.
+    /// Each surface is lit while it is drawn, and refracted light is added triangle by triangle.
     Forward,
     /// Opaque surfaces under Phong shading are drawn into a G-buffer, and only what is visible of them is
     /// lit, once. These surfaces are still lit forward: those with textures other than a base colour, those
     /// with an alpha mask or filtered highlights, those that no light is evaluated on, those beyond the 255
     /// combinations of shader variant and lightmap that the G-buffer can number, and all surfaces of a frame
     /// with several samples per pixel. Of coplanar surfaces, one that is lit forward hides one that is lit
-    /// deferred.
+    /// deferred. Refracted light is added pixel by pixel, unless there are several samples.
     Deferred,
 }
 

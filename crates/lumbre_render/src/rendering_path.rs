@@ -1,5 +1,5 @@
-//! Chooses whether opaque surfaces of a frame are lit forward or deferred, and says why. How deferred shading
-//! works is described in `g_buffer`.
+//! Chooses whether opaque surfaces of a frame are lit forward or deferred, and says why; and whether refracted light is
+//! added pixel by pixel. How deferred shading works is described in `g_buffer`, and refraction in `effects::refraction`.
 
 use std::fmt::{Display, Formatter};
 
@@ -20,6 +20,27 @@ const ENOUGH_LIGHTS_ON_A_GPU: u32 = 1024;
 const MAX_PIXELS: u64 = 16;
 /// The same of a GPU; the H100 gained with 28.
 const MAX_PIXELS_ON_A_GPU: u64 = 32;
+
+/// Triangles of a refractive surface, on average, from which on a software rasterizer gains by light that is added pixel
+/// by pixel: it traces rays for whole blocks of pixels for each triangle. A pane fills its blocks anyway.
+const MANY_REFRACTIVE_TRIANGLES: usize = 64;
+
+/// Chooses whether refracted light is added pixel by pixel. Like the rendering path, the choice depends on the scene
+/// and not on the view. Front faces are drawn with one sample per pixel.
+pub(crate) fn refracts_by_pixel(
+    options: &FrameOptions,
+    objects: &ObjectCensus,
+    (samples, software): (u32, bool),
+) -> bool {
+    let gains = match options.rendering_path {
+        RenderingPath::Forward => false,
+        RenderingPath::Deferred => true,
+        RenderingPath::Auto => {
+            software && objects.refractive_triangles >= MANY_REFRACTIVE_TRIANGLES * objects.refractive
+        }
+    };
+    gains && samples == 1 && objects.refractive > 0
+}
 
 /// The rendering path of a frame, by the reason for it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -31,8 +31,8 @@ pub(crate) struct ErrorGoals {
     share: f64,
     /// The sum that individually sampled sources may leave.
     pub individual: f64,
-    /// What they may leave where the rest takes many samples: more if other light is sampled, too, which may take them
-    /// instead.
+    /// What they may leave once a round of many samples has missed the goal: more if shared sources and a gather can
+    /// use the samples better.
     pub individual_enough: f64,
     /// Whether light bounces, so that a final gather follows.
     has_gather: bool,
@@ -52,7 +52,8 @@ impl ErrorGoals {
         // the error.
         let share = if has_shared && has_gather { MIN_SHARED_SHARE } else { INDIVIDUAL_SHARE };
         let individual = total * if has_shared { 0.5 * share } else { share };
-        let individual_enough = if has_shared { ENOUGH_BESIDE_SHARED * individual } else { individual };
+        let is_one_of_three = has_shared && has_gather;
+        let individual_enough = if is_one_of_three { ENOUGH_OF_THREE * individual } else { individual };
         Self { total, share, individual, individual_enough, has_gather }
     }
 
@@ -74,9 +75,9 @@ const INDIVIDUAL_SHARE: f64 = 0.35;
 /// Its least and greatest value where sources share samples and a gather follows.
 const MIN_SHARED_SHARE: f64 = 0.2;
 const MAX_SHARED_SHARE: f64 = 0.5;
-/// How many times their goal individually sampled sources may leave beside shared ones, if the rest takes many samples:
-/// at most what the shared ones may leave.
-const ENOUGH_BESIDE_SHARED: f64 = 2.0;
+/// How many times their goal individually sampled sources may leave beside shared ones and a gather once a round of many
+/// samples has missed it: a fifth of the whole, beside a tenth or more for the shared ones.
+const ENOUGH_OF_THREE: f64 = 2.0;
 /// The share that direct light and the gather may leave together.
 const BOTH_SHARE: f64 = 0.85;
 /// Cost of the gather: its rays per texel times the share of the squared error that they leave. From 7 in a room to 30

@@ -11,8 +11,8 @@
 //!   [front faces ──► normals and objects] ───────────────┘
 //! ```
 //!
-//! Light is added triangle by triangle, or, where triangles are small for a software rasterizer, pixel by pixel:
-//! the visible front faces are drawn first, and each surface's light is added over its part of the frame.
+//! Light is added triangle by triangle, or pixel by pixel (`rendering_path` chooses): then the visible front faces are
+//! drawn first, and each surface's light is added over its part of the frame.
 
 use std::collections::HashMap;
 
@@ -36,7 +36,7 @@ use crate::frame_scene::{FrameScene, SHAPE};
 use crate::pending::Pending;
 use crate::shader::{self, Feature};
 use crate::target::DEPTH_FORMAT;
-use crate::{FrameOptions, Gpu, RenderError, RenderingPath};
+use crate::{FrameOptions, Gpu, RenderError};
 
 /// Format of the octahedral normals of back faces.
 const BACK_NORMALS: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
@@ -45,15 +45,13 @@ const NO_DIRECTION: wgpu::Color = wgpu::Color { r: 2.0, g: 2.0, b: 0.0, a: 0.0 }
 
 /// Format of visible front faces: their objects and normals, packed by shaders/refraction.wesl.
 const FRONT_FACES: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
-/// A software rasterizer gains by light that is added pixel by pixel from this many triangles of a surface on. A pane
-/// fills its blocks of pixels anyway.
-const MANY_TRIANGLES: usize = 64;
 
 #[derive(Debug, Default)]
 pub(super) struct Refraction {
     /// Whether the scene has transmissive meshes, and whether refraction is switched on.
     called_for: [bool; 2],
-    path: RenderingPath,
+    /// Whether light is added pixel by pixel.
+    by_pixel: bool,
     fog: Option<Feature>,
     /// The surfaces in view.
     surfaces: Vec<RefractorSurface>,
@@ -78,8 +76,8 @@ enum Key {
 struct Keys {
     back_faces: [Key; 2],
     surfaces: Key,
-    /// Whether front faces are drawn, and light is added pixel by pixel.
-    from_front_faces: bool,
+    /// Draws front faces, where light is added pixel by pixel.
+    front_faces: Option<Key>,
 }
 
 impl Keys {
@@ -88,13 +86,12 @@ impl Keys {
         Self {
             back_faces: [false, true].map(|mirrored| Key::BackFaces { mirrored }),
             surfaces: Key::Surfaces { format, samples, fog, from_front_faces },
-            from_front_faces,
+            front_faces: from_front_faces.then_some(Key::FrontFaces),
         }
     }
 
     fn all(&self) -> impl Iterator<Item = Key> + use<> {
-        let front_faces = self.from_front_faces.then_some(Key::FrontFaces);
-        [self.back_faces[0], self.back_faces[1], self.surfaces].into_iter().chain(front_faces)
+        [self.back_faces[0], self.back_faces[1], self.surfaces].into_iter().chain(self.front_faces)
     }
 }
 
@@ -140,7 +137,7 @@ impl Effect for Refraction {
 
     fn extract(&mut self, _: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool {
         self.called_for = [facts.census.refractive > 0, options.refraction];
-        self.path = options.rendering_path;
+        self.by_pixel = facts.refracts_by_pixel;
         self.fog = facts.settings.fog.as_ref().map(|fog| fog_feature(&fog.mode));
         (self.surfaces, self.keys) = (Vec::new(), None);
         facts.refractive > 0
@@ -157,25 +154,15 @@ impl Effect for Refraction {
     fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
         let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
         let mut ready = true;
-        // Which of them a frame uses depends on what is in sight.
-        let either = [false, true].map(|from_front_faces| Keys::of(frame, self.fog, from_front_faces));
-        for keys in either
-            .iter()
-            .filter(|keys| !keys.from_front_faces || may_use_front_faces(gpu, frame.samples, self.path))
-        {
-            for key in keys.all() {
-                ready &= device.pipeline(gpu, key, false)?;
-            }
+        for key in Keys::of(frame, self.fog, self.by_pixel).all() {
+            ready &= device.pipeline(gpu, key, false)?;
         }
         Ok(ready)
     }
 
     fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         self.surfaces.clone_from(&frame.refractors);
-        let small = self.surfaces.iter().any(|surface| surface.triangles >= MANY_TRIANGLES);
-        let wanted = small || self.path == RenderingPath::Deferred;
-        let from_front_faces = wanted && may_use_front_faces(gpu, frame.samples, self.path);
-        let keys = Keys::of(frame, self.fog, from_front_faces);
+        let keys = Keys::of(frame, self.fog, self.by_pixel);
         let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
         if !self.surfaces.is_empty() {
             for key in keys.all() {
@@ -210,7 +197,6 @@ impl Effect for Refraction {
         let mut behind_depth = graph.texture("depth behind", several);
         let mut back_normals = graph.texture("normals of back faces", described(BACK_NORMALS));
         let mut back_depth = graph.texture("depth of back faces", described(DEPTH_FORMAT));
-        let from_front_faces = self.keys.is_some_and(|keys| keys.from_front_faces);
         if in_scene && switched_on && in_sight {
             let copies = [(board.linear, behind), (board.depth, behind_depth)];
             graph
@@ -239,7 +225,7 @@ impl Effect for Refraction {
                 Ok(())
             });
         if in_scene && switched_on && in_sight {
-            let front_faces = from_front_faces.then(|| {
+            let front_faces = self.by_pixel.then(|| {
                 let mut front_faces = graph.texture("front faces", described(FRONT_FACES));
                 graph
                     .raster_pass("front faces")
@@ -338,17 +324,6 @@ impl Refraction {
         }
         Ok(())
     }
-}
-
-/// Returns true if light may be added pixel by pixel: on a device that gains by it, or where the options ask for
-/// deferred shading. Front faces are drawn with one sample per pixel.
-fn may_use_front_faces(gpu: &Gpu, samples: u32, path: RenderingPath) -> bool {
-    let allowed = match path {
-        RenderingPath::Forward => false,
-        RenderingPath::Deferred => true,
-        RenderingPath::Auto => gpu.is_software(),
-    };
-    allowed && samples == 1
 }
 
 /// Copies whole textures to others of the same size.

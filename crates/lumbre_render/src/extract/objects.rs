@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, DVec4};
 use lumbre_mesh::TextureCoordinateSet;
 use lumbre_optics::{Lobe, Material, ReflectionModel, Shading, Surface};
 use lumbre_scene::{
@@ -35,7 +35,7 @@ pub(crate) struct Object {
     pub traits: ObjectTraits,
     optional: Optional,
     /// Number of triangles of its mesh.
-    pub triangles: usize,
+    triangles: usize,
     /// Whether it is counted in the census.
     counted: bool,
     /// A message with its name if it cannot be drawn.
@@ -331,6 +331,13 @@ pub(crate) fn world_box(center: DVec3, half: DVec3, transform: &GlobalTransform)
 }
 
 impl Object {
+    /// Returns how far its box extends from its centre along the normal of a plane. A box that is infinite, or not a
+    /// number, extends to infinity.
+    pub fn reach(&self, plane: DVec4) -> f64 {
+        let reach = plane.truncate().abs().dot(self.half_size);
+        if reach.is_nan() { f64::INFINITY } else { reach }
+    }
+
     fn new(entity: Entity, mesh: MeshKey, traits: ObjectTraits) -> Self {
         Self {
             entity,

@@ -66,6 +66,8 @@ pub struct ObjectCensus {
     pub transmission: usize,
     /// Transmissive objects through which the scene behind them can be drawn.
     pub refractive: usize,
+    /// Their triangles.
+    pub refractive_triangles: usize,
     /// Of these, objects lit by a lightmap.
     pub lightmapped_refractive: usize,
 }
@@ -109,6 +111,7 @@ impl ObjectCensus {
         let blended = traits.alpha_mode == AlphaMode::Blend;
         let by_lightmap = traits.is_lit_by_lightmap();
         change(&mut self.triangles, triangles);
+        change(&mut self.refractive_triangles, if traits.refracts { triangles } else { 0 });
         for (counter, counts) in [
             (&mut self.meshes, true),
             (&mut self.static_objects, traits.mobility == Mobility::Static),
