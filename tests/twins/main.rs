@@ -23,6 +23,7 @@ mod probes;
 mod refraction;
 mod regressions;
 mod shading;
+mod srgb;
 mod vectors;
 mod verdict;
 mod worst_inputs;
