@@ -279,6 +279,12 @@ fn front_faces_are_drawn_where_triangles_are_many() {
         Transform::from_xyz(0.0, 1.0, 0.5).with_rotation(DQuat::from_rotation_x(1.4)),
     ));
     assert!(!front_faces(&mut world, options()));
+    // Beside a ball the light of the pane is still added by its triangles.
+    ball(&mut world, Medium::default());
+    let report = draw(&mut world, WIDTH, HEIGHT, &options()).1;
+    for (name, runs) in [("refraction", true), ("refraction by pixel", software)] {
+        assert_eq!(report.plan.running().any(|pass| pass == name), runs, "{name}");
+    }
 }
 
 #[test]
@@ -286,8 +292,9 @@ fn a_frame_without_glass_in_sight_has_none_of_it() {
     let status = |world: &mut World, options: &FrameOptions| {
         let (pixels, report) = draw(world, WIDTH, HEIGHT, options);
         let passes: Vec<&str> = report.plan.running().collect();
-        let none =
-            !passes.iter().any(|pass| ["behind", "back faces", "front faces", "refraction"].contains(pass));
+        let none = !passes.iter().any(|pass| {
+            ["behind", "back faces", "front faces", "refraction", "refraction by pixel"].contains(pass)
+        });
         assert!(none, "{passes:?}");
         (pixels, format!("{:?}", report.plan.status("refractive surfaces").unwrap()))
     };

@@ -92,7 +92,8 @@ pub enum RenderingPath {
     /// lights that fragments find by clusters and one triangle for every 16 pixels of the frame, on a GPU with
     /// 1024 lights and a triangle for every 32 pixels. Otherwise forward. Whole blocks of pixels are shaded for
     /// each triangle, and a small triangle fills little of a block. For the same reason a software rasterizer adds
-    /// refracted light pixel by pixel if refractive surfaces have 64 triangles or more, on average.
+    /// the refracted light of surfaces with 64 triangles or more pixel by pixel, if the scene's refractive surfaces
+    /// have so many on average.
     #[default]
     Auto,
     /// Each surface is lit while it is drawn, and refracted light is added triangle by triangle.
@@ -102,7 +103,8 @@ pub enum RenderingPath {
     /// with an alpha mask or filtered highlights, those that no light is evaluated on, those beyond the 255
     /// combinations of shader variant and lightmap that the G-buffer can number, and all surfaces of a frame
     /// with several samples per pixel. Of coplanar surfaces, one that is lit forward hides one that is lit
-    /// deferred. Refracted light is added pixel by pixel, unless there are several samples.
+    /// deferred. Refracted light of surfaces with 64 triangles or more is added pixel by pixel,
+    /// unless there are several samples.
     Deferred,
 }
 

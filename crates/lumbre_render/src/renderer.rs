@@ -810,6 +810,7 @@ impl Renderer {
                 slot,
                 thin: refractor.thin,
                 mirrored: object.mirrored,
+                triangles: object.triangles,
                 window: view.window_of_box(object.center, object.half_size).unwrap_or(view.window),
                 data,
             })

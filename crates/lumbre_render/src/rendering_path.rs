@@ -21,25 +21,25 @@ const MAX_PIXELS: u64 = 16;
 /// The same of a GPU; the H100 gained with 28.
 const MAX_PIXELS_ON_A_GPU: u64 = 32;
 
-/// Triangles of a refractive surface, on average, from which on a software rasterizer gains by light that is added pixel
-/// by pixel: it traces rays for whole blocks of pixels for each triangle. A pane fills its blocks anyway.
-const MANY_REFRACTIVE_TRIANGLES: usize = 64;
+/// Triangles of a refractive surface from which on a software rasterizer gains by light that is added pixel by pixel: it
+/// traces rays for whole blocks of pixels for each triangle. A pane fills its blocks anyway.
+pub(crate) const MANY_REFRACTIVE_TRIANGLES: usize = 64;
 
-/// Chooses whether refracted light is added pixel by pixel. Like the rendering path, the choice depends on the scene
+/// Chooses whether the light of refractive surfaces with [`MANY_REFRACTIVE_TRIANGLES`] is added pixel by pixel: on a
+/// software rasterizer or where the options ask for deferred shading, if the scene's have so many on average. Like the rendering path, the choice depends on the scene
 /// and not on the view. Front faces are drawn with one sample per pixel.
 pub(crate) fn refracts_by_pixel(
     options: &FrameOptions,
     objects: &ObjectCensus,
     (samples, software): (u32, bool),
 ) -> bool {
-    let gains = match options.rendering_path {
+    let may = match options.rendering_path {
         RenderingPath::Forward => false,
         RenderingPath::Deferred => true,
-        RenderingPath::Auto => {
-            software && objects.refractive_triangles >= MANY_REFRACTIVE_TRIANGLES * objects.refractive
-        }
+        RenderingPath::Auto => software,
     };
-    gains && samples == 1 && objects.refractive > 0
+    let many = objects.refractive_triangles >= MANY_REFRACTIVE_TRIANGLES * objects.refractive;
+    may && many && samples == 1 && objects.refractive > 0
 }
 
 /// The rendering path of a frame, by the reason for it.

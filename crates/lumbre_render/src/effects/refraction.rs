@@ -11,8 +11,8 @@
 //!   [front faces ──► normals and objects] ───────────────┘
 //! ```
 //!
-//! Light is added triangle by triangle, or pixel by pixel (`rendering_path` chooses): then the visible front faces are
-//! drawn first, and each surface's light is added over its part of the frame.
+//! Light is added triangle by triangle, or, of surfaces with many triangles, pixel by pixel (`rendering_path` chooses):
+//! then their visible front faces are drawn first, and each surface's light is added over its part of the frame.
 
 use std::collections::HashMap;
 
@@ -34,6 +34,7 @@ use crate::frame_bindings::FrameBuffer;
 use crate::frame_plan::FrameShape;
 use crate::frame_scene::{FrameScene, SHAPE};
 use crate::pending::Pending;
+use crate::rendering_path::MANY_REFRACTIVE_TRIANGLES;
 use crate::shader::{self, Feature};
 use crate::target::DEPTH_FORMAT;
 use crate::{FrameOptions, Gpu, RenderError};
@@ -50,7 +51,7 @@ const FRONT_FACES: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
 pub(super) struct Refraction {
     /// Whether the scene has transmissive meshes, and whether refraction is switched on.
     called_for: [bool; 2],
-    /// Whether light is added pixel by pixel.
+    /// Whether the light of surfaces with many triangles is added pixel by pixel.
     by_pixel: bool,
     fog: Option<Feature>,
     /// The surfaces in view.
@@ -75,23 +76,26 @@ enum Key {
 #[derive(Clone, Copy, Debug)]
 struct Keys {
     back_faces: [Key; 2],
-    surfaces: Key,
-    /// Draws front faces, where light is added pixel by pixel.
-    front_faces: Option<Key>,
+    /// Adds light triangle by triangle.
+    triangles: Key,
+    /// Draw front faces and add their light, where that is done pixel by pixel.
+    pixels: Option<[Key; 2]>,
 }
 
 impl Keys {
-    fn of(frame: &FrameShape, fog: Option<Feature>, from_front_faces: bool) -> Self {
+    fn of(frame: &FrameShape, fog: Option<Feature>, by_pixel: bool) -> Self {
         let (format, samples) = (frame.lit_format, frame.samples);
+        let surfaces = |from_front_faces| Key::Surfaces { format, samples, fog, from_front_faces };
         Self {
             back_faces: [false, true].map(|mirrored| Key::BackFaces { mirrored }),
-            surfaces: Key::Surfaces { format, samples, fog, from_front_faces },
-            front_faces: from_front_faces.then_some(Key::FrontFaces),
+            triangles: surfaces(false),
+            pixels: by_pixel.then(|| [Key::FrontFaces, surfaces(true)]),
         }
     }
 
     fn all(&self) -> impl Iterator<Item = Key> + use<> {
-        [self.back_faces[0], self.back_faces[1], self.surfaces].into_iter().chain(self.front_faces)
+        let pixels = self.pixels.into_iter().flatten();
+        [self.back_faces[0], self.back_faces[1], self.triangles].into_iter().chain(pixels)
     }
 }
 
@@ -225,31 +229,42 @@ impl Effect for Refraction {
                 Ok(())
             });
         if in_scene && switched_on && in_sight {
-            let front_faces = self.by_pixel.then(|| {
-                let mut front_faces = graph.texture("front faces", described(FRONT_FACES));
-                graph
-                    .raster_pass("front faces")
-                    .color(&mut front_faces, LoadOp::Clear(wgpu::Color::TRANSPARENT))
-                    .depth(&mut board.depth, LoadOp::Load)
-                    .run(move |context| self.draw_front_faces(context));
-                [front_faces, board.depth]
-            });
             let mirrored =
                 board.get::<MirrorPictures>().map(|pictures| pictures.0.clone()).unwrap_or_default();
-            let mut pass =
-                board.lit_pass(graph, self.name(), LoadOp::Load).samples(&behind).samples(&behind_depth);
             let back_faces = solid.then_some([back_normals, back_depth]);
-            for picture in back_faces.iter().flatten() {
-                pass = pass.samples(picture);
+            // The average surface of a scene whose light is added by pixels has many triangles.
+            let [by_triangle, by_pixel] = match self.keys {
+                None => [!self.by_pixel, self.by_pixel],
+                Some(_) => [false, true].map(|by_pixel| self.surfaces_by(by_pixel).next().is_some()),
+            };
+            for (name, pixels, has_surfaces) in
+                [(self.name(), false, by_triangle), ("refraction by pixel", true, by_pixel)]
+            {
+                if !has_surfaces {
+                    continue;
+                }
+                let front_faces = pixels.then(|| {
+                    let mut front_faces = graph.texture("front faces", described(FRONT_FACES));
+                    graph
+                        .raster_pass("front faces")
+                        .color(&mut front_faces, LoadOp::Clear(wgpu::Color::TRANSPARENT))
+                        .depth(&mut board.depth, LoadOp::Load)
+                        .run(move |context| self.draw_front_faces(context));
+                    [front_faces, board.depth]
+                });
+                let mut pass =
+                    board.lit_pass(graph, name, LoadOp::Load).samples(&behind).samples(&behind_depth);
+                let sampled = back_faces.iter().chain(&front_faces).flatten().chain(mirrored.values());
+                for picture in sampled {
+                    pass = pass.samples(picture);
+                }
+                if front_faces.is_none() {
+                    pass = pass.depth(&mut board.depth, LoadOp::Load);
+                }
+                let pictures = Pictures { behind, behind_depth, back_faces, front_faces };
+                let mirrored = mirrored.clone();
+                pass.run(move |context| self.add_light(context, &pictures, &mirrored));
             }
-            for picture in mirrored.values().chain(front_faces.iter().flatten()) {
-                pass = pass.samples(picture);
-            }
-            if front_faces.is_none() {
-                pass = pass.depth(&mut board.depth, LoadOp::Load);
-            }
-            let pictures = Pictures { behind, behind_depth, back_faces, front_faces };
-            pass.run(move |context| self.add_light(context, &pictures, &mirrored));
         }
     }
 }
@@ -260,6 +275,14 @@ impl Refraction {
         let device = self.device.as_ref()?;
         let pipeline = device.pipelines.get(&of(self.keys.as_ref()?)).and_then(Pending::get)?.ok()?;
         Some((device, pipeline))
+    }
+
+    /// Returns the surfaces whose light is added pixel by pixel, or the others; each with its place in the list.
+    fn surfaces_by(&self, pixel: bool) -> impl Iterator<Item = (usize, &RefractorSurface)> {
+        let surfaces = self.surfaces.iter().enumerate();
+        surfaces.filter(move |(_, surface)| {
+            (self.by_pixel && surface.triangles >= MANY_REFRACTIVE_TRIANGLES) == pixel
+        })
     }
 
     fn draw_back_faces(&self, context: &mut RasterContext<'_, FrameScene<'_>>) -> Result<(), EffectError> {
@@ -285,7 +308,7 @@ impl Refraction {
         let Some(view) = device.view_group(context) else { return Ok(()) };
         context.pass.set_pipeline(pipeline);
         context.pass.set_bind_group(0, &view, &[]);
-        for surface in &self.surfaces {
+        for (_, surface) in self.surfaces_by(true) {
             context.user.draw_shape(context.pass, surface.slot, &SHAPE);
         }
         Ok(())
@@ -297,20 +320,22 @@ impl Refraction {
         pictures: &Pictures,
         mirrored: &HashMap<usize, TextureHandle>,
     ) -> Result<(), EffectError> {
-        let Some((device, pipeline)) = self.pipeline(|keys| keys.surfaces) else { return Ok(()) };
+        let by_pixel = pictures.front_faces.is_some();
+        let of = |keys: &Keys| keys.pixels.filter(|_| by_pixel).map_or(keys.triangles, |[_, light]| light);
+        let Some((device, pipeline)) = self.pipeline(of) else { return Ok(()) };
         let Some(view) = device.view_group(context) else { return Ok(()) };
         context.pass.set_pipeline(pipeline);
         context.pass.set_bind_group(0, &view, &[]);
         // Surfaces without a reflection picture search for their reflection in the frame so far.
         let plain = device.surface_group(&context.resources, pictures, &pictures.behind)?;
-        for (index, surface) in self.surfaces.iter().enumerate() {
+        for (index, surface) in self.surfaces_by(by_pixel) {
             let picture = mirrored.get(&surface.slot);
             let own =
                 picture.map(|own| device.surface_group(&context.resources, pictures, own)).transpose()?;
             let Some(group) = own.as_ref().map_or(plain.as_ref(), Option::as_ref) else { continue };
             let offset = SurfaceUniforms::offset(2 * index + usize::from(picture.is_some()));
             context.pass.set_bind_group(1, group, &[offset]);
-            if pictures.front_faces.is_none() {
+            if !by_pixel {
                 context.user.draw_shape(context.pass, surface.slot, &SHAPE);
             } else if let Ok(object) = u32::try_from(surface.slot) {
                 let [x, y, width, height] = surface.window.pixels(context.user.size);
@@ -318,7 +343,7 @@ impl Refraction {
                 context.pass.draw(0..3, object..object + 1);
             }
         }
-        if pictures.front_faces.is_some() {
+        if by_pixel {
             let [width, height] = context.user.size;
             context.pass.set_scissor_rect(0, 0, width, height);
         }

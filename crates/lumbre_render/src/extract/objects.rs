@@ -35,7 +35,7 @@ pub(crate) struct Object {
     pub traits: ObjectTraits,
     optional: Optional,
     /// Number of triangles of its mesh.
-    triangles: usize,
+    pub triangles: usize,
     /// Whether it is counted in the census.
     counted: bool,
     /// A message with its name if it cannot be drawn.

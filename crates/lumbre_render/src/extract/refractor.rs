@@ -56,6 +56,8 @@ pub(crate) struct RefractorSurface {
     pub thin: bool,
     /// Its transform mirrors, so its triangles have the opposite winding.
     pub mirrored: bool,
+    /// Number of triangles of its mesh.
+    pub triangles: usize,
     /// A part of the frame that contains it.
     pub window: Window,
     pub data: RefractorData,
