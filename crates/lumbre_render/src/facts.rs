@@ -35,7 +35,7 @@ pub struct SceneFacts {
     pub samples: u32,
     /// Whether opaque surfaces are lit forward or deferred.
     pub(crate) path: ChosenPath,
-    /// Whether refracted light is added pixel by pixel instead of triangle by triangle.
+    /// Whether the refracted light of surfaces with many triangles is added pixel by pixel.
     pub(crate) refracts_by_pixel: bool,
     /// The contents of the G-buffer, if the frame is shaded deferred.
     pub(crate) g_buffer: Option<GBufferContents>,

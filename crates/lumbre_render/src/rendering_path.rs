@@ -26,8 +26,8 @@ const MAX_PIXELS_ON_A_GPU: u64 = 32;
 pub(crate) const MANY_REFRACTIVE_TRIANGLES: usize = 64;
 
 /// Chooses whether the light of refractive surfaces with [`MANY_REFRACTIVE_TRIANGLES`] is added pixel by pixel: on a
-/// software rasterizer or where the options ask for deferred shading, if the scene's have so many on average. Like the rendering path, the choice depends on the scene
-/// and not on the view. Front faces are drawn with one sample per pixel.
+/// software rasterizer or where the options ask for deferred shading, if the scene's have so many on average. Like the
+/// rendering path, the choice depends on the scene and not on the view. Front faces are drawn with one sample per pixel.
 pub(crate) fn refracts_by_pixel(
     options: &FrameOptions,
     objects: &ObjectCensus,

@@ -136,8 +136,9 @@ impl<'a> SourceSampler<'a> {
     }
 
     /// Makes lamps share samples in blocks of which a good part lies in penumbrae of any source (see
-    /// [`shares_penumbrae`]): behind a grille, or among many thin blockers. The visible share of each texel by itself would take hundreds of
-    /// rays, while smoothing makes use of the neighbours' samples. The light of these blocks is sampled again.
+    /// [`shares_penumbrae`]): behind a grille, or among many thin blockers. The visible share of each texel by itself
+    /// would take hundreds of rays, while smoothing makes use of the neighbours' samples. The light of these blocks is
+    /// sampled again.
     pub fn share_penumbrae(
         &mut self,
         direct: &mut [Direct],
