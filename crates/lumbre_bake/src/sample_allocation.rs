@@ -71,87 +71,142 @@ const FACTOR: f64 = 4.0;
 const LEAST: f64 = 1e-9;
 /// Bisections of the interval in which the search ends.
 const BISECTIONS: u32 = 6;
+/// Bisections, of the logarithm, with which the search for what a budget allows ends: to 2 % of the worth.
+const BUDGET_BISECTIONS: u32 = 10;
 
 impl SampleAllocator<'_> {
     /// Allocates the samples that bring the sum of the texels' variances down to `goal`. Each texel's samples are doubled
     /// a few times, up to the most; if that does not suffice, every texel gets as many as it may.
     pub fn reach(&self, goal: f64) -> Vec<SampleAllocation> {
-        let Self { texels, variances, samples, most, order } = *self;
-        // With k times the samples, a sample is worth k^-(1 + p) of what it was, and k^-p of the variance is left.
-        let powers = |exponent: f64| [1.0, 2.0, 4.0, 8.0].map(|factor: f64| factor.powf(exponent));
-        let (devalued, remaining) = (powers(1.0 + order), powers(-order));
-        let worth = |texel: CoveredTexel| {
-            f64::from(variances[texel.place()]) / f64::from(samples[texel.place()].max(1))
-        };
-        // How many times a texel's samples are doubled; the last time, perhaps only up to `most`.
-        let doublings = |texel: CoveredTexel, least_worth: f64| {
-            let (current, worth) = (samples[texel.place()].max(1), worth(texel));
-            let mut doublings = 0;
-            while doublings < MAX_DOUBLINGS
-                && current << doublings < most
-                && worth > least_worth * devalued[doublings]
-            {
-                doublings += 1;
-            }
-            doublings
-        };
-        let left = |least_worth: f64| -> f64 {
-            let variance_left = |&texel: &CoveredTexel| {
-                f64::from(variances[texel.place()]) * remaining[doublings(texel, least_worth)]
-            };
-            // Chunks of a fixed size make the sum the same on any number of threads.
-            let sums: Vec<f64> =
-                texels.par_chunks(CHUNK).map(|chunk| chunk.iter().map(variance_left).sum()).collect();
-            sums.iter().sum()
-        };
-        let highest = texels.iter().copied().map(worth).fold(0.0, f64::max);
-        // A least worth of 0 gives every texel all that it may have; a higher one suffices if it meets the goal.
-        let (mut too_high, mut least_worth) = (0.0, highest);
-        if left(highest) > goal {
-            least_worth = 0.0;
-            let mut tried = highest;
-            // Variances differ by many orders of magnitude: go down by a factor until the goal is met or no texel can have
-            // more.
-            while tried > f64::MIN_POSITIVE && left(tried) > goal && tried > highest * LEAST {
-                (too_high, tried) = (tried, tried / FACTOR);
-            }
-            if left(tried) <= goal {
-                let (mut above, mut below) = (too_high, tried);
-                for _ in 0..BISECTIONS {
-                    let middle = 0.5 * (above + below);
-                    if left(middle) <= goal { below = middle } else { above = middle }
-                }
-                least_worth = below;
-            }
-        }
-        let wanted = |texel: CoveredTexel| {
-            let current = samples[texel.place()].max(1);
-            (current << doublings(texel, least_worth)).min(most.max(current))
-        };
-        let allocations = texels.iter().map(|&texel| SampleAllocation { texel, samples: wanted(texel) });
-        allocations.filter(|allocation| allocation.samples > samples[allocation.texel.place()]).collect()
+        let search = LeastWorthSearch::new(self);
+        search.allocated(search.least_worth(goal))
     }
 
-    /// Like [`SampleAllocator::reach`], but with at most `budget` additional samples in total: if they do not suffice, the
-    /// goal is raised step by step until they do.
-    pub fn within(&self, budget: u64, mut goal: f64) -> Vec<SampleAllocation> {
-        let left: f64 = self.texels.iter().map(|texel| f64::from(self.variances[texel.place()])).sum();
-        loop {
-            let wanted = self.reach(goal);
-            if self.added(&wanted) <= budget {
-                return wanted;
-            }
-            if goal >= left {
-                return Vec::new();
-            }
-            goal = (goal * RELAXED).max(left * LEAST);
+    /// Like [`SampleAllocator::reach`], but with at most `budget` additional samples in total: if they do not suffice, they
+    /// go where they are worth most. Texels where they are worth the same get them together or not at all.
+    pub fn within(&self, budget: u64, goal: f64) -> Vec<SampleAllocation> {
+        let search = LeastWorthSearch::new(self);
+        let least_worth = search.least_worth(goal);
+        if search.added(least_worth) <= budget {
+            return search.allocated(least_worth);
         }
+        let highest = search.highest;
+        let (mut too_low, mut affordable) = (least_worth.max(highest * LEAST), highest);
+        for _ in 0..BUDGET_BISECTIONS {
+            let middle = (too_low * affordable).sqrt();
+            if search.added(middle) <= budget { affordable = middle } else { too_low = middle }
+        }
+        search.allocated(affordable)
+    }
+
+    /// What the next sample of a texel lowers the sum of the variances by, but for a constant factor.
+    fn worth(&self, texel: CoveredTexel) -> f64 {
+        f64::from(self.variances[texel.place()]) / f64::from(self.samples[texel.place()].max(1))
     }
 
     /// How many samples the allocations add.
     pub fn added(&self, allocations: &[SampleAllocation]) -> u64 {
         let added = |to: &SampleAllocation| u64::from(to.samples - self.samples[to.texel.place()]);
         allocations.iter().map(added).sum()
+    }
+}
+
+/// The search for the least worth of a sample that is taken. A sample's worth is what it lowers the sum of the variances
+/// by, but for a constant factor.
+struct LeastWorthSearch<'a> {
+    allocator: &'a SampleAllocator<'a>,
+    /// The highest finite worth of any texel's next sample.
+    highest: f64,
+    /// By how often a texel's samples are doubled: what a sample is worth then, as a share of what it was, and the share
+    /// of the variance that is left.
+    devalued: [f64; MAX_DOUBLINGS + 1],
+    remaining: [f64; MAX_DOUBLINGS + 1],
+}
+
+impl<'a> LeastWorthSearch<'a> {
+    fn new(allocator: &'a SampleAllocator<'a>) -> Self {
+        // With k times the samples, a sample is worth k^-(1 + p) of what it was, and k^-p of the variance is left.
+        let powers = |exponent: f64| [1.0, 2.0, 4.0, 8.0].map(|factor: f64| factor.powf(exponent));
+        let (devalued, remaining) = (powers(-1.0 - allocator.order), powers(-allocator.order));
+        let worth = |&texel: &CoveredTexel| allocator.worth(texel);
+        let finite = allocator.texels.iter().map(worth).filter(|worth| worth.is_finite());
+        let highest = finite.fold(0.0, f64::max);
+        Self { allocator, highest, devalued, remaining }
+    }
+
+    /// The allocations if every sample is to be worth at least this much.
+    fn allocated(&self, least_worth: f64) -> Vec<SampleAllocation> {
+        let SampleAllocator { texels, samples: before, .. } = *self.allocator;
+        let allocation =
+            |&texel: &CoveredTexel| SampleAllocation { texel, samples: self.samples(least_worth, texel) };
+        let allocations = texels.iter().map(allocation);
+        allocations.filter(|allocation| allocation.samples > before[allocation.texel.place()]).collect()
+    }
+
+    /// The number of samples that they add.
+    fn added(&self, least_worth: f64) -> u64 {
+        let SampleAllocator { texels, samples: before, .. } = *self.allocator;
+        let added = |&texel: &CoveredTexel| {
+            u64::from(self.samples(least_worth, texel).saturating_sub(before[texel.place()]))
+        };
+        texels.par_iter().map(added).sum()
+    }
+
+    /// The samples of a texel.
+    fn samples(&self, least_worth: f64, texel: CoveredTexel) -> u32 {
+        let current = self.allocator.samples[texel.place()].max(1);
+        (current << self.doublings(least_worth, texel)).min(self.allocator.most.max(current))
+    }
+
+    /// How many times a texel's samples are doubled; the last time, perhaps only up to the most.
+    fn doublings(&self, least_worth: f64, texel: CoveredTexel) -> usize {
+        let SampleAllocator { samples, most, .. } = *self.allocator;
+        let (current, worth) = (samples[texel.place()].max(1), self.allocator.worth(texel));
+        let mut doublings = 0;
+        while doublings < MAX_DOUBLINGS
+            && current << doublings < most
+            && worth * self.devalued[doublings] > least_worth
+        {
+            doublings += 1;
+        }
+        doublings
+    }
+
+    /// The sum of the variances that is left.
+    fn left(&self, least_worth: f64) -> f64 {
+        let SampleAllocator { texels, variances, .. } = *self.allocator;
+        let variance_left = |&texel: &CoveredTexel| {
+            f64::from(variances[texel.place()]) * self.remaining[self.doublings(least_worth, texel)]
+        };
+        // Chunks of a fixed size make the sum the same on any number of threads.
+        let sums: Vec<f64> =
+            texels.par_chunks(CHUNK).map(|chunk| chunk.iter().map(variance_left).sum()).collect();
+        sums.iter().sum()
+    }
+
+    /// The least worth with which the sum of the variances falls to `goal`; 0 if none is low enough.
+    fn least_worth(&self, goal: f64) -> f64 {
+        // A least worth of 0 gives every texel all that it may have; a higher one suffices if it meets the goal.
+        if self.left(self.highest) <= goal {
+            return self.highest;
+        }
+        let (mut too_high, mut tried) = (0.0, self.highest);
+        // Variances differ by many orders of magnitude: go down by a factor until the goal is met or no texel can have
+        // more.
+        let mut is_met = false;
+        while !is_met && tried > f64::MIN_POSITIVE && tried > self.highest * LEAST {
+            (too_high, tried) = (tried, tried / FACTOR);
+            is_met = self.left(tried) <= goal;
+        }
+        if !is_met {
+            return 0.0;
+        }
+        let (mut above, mut below) = (too_high, tried);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (above + below);
+            if self.left(middle) <= goal { below = middle } else { above = middle }
+        }
+        below
     }
 }
 
@@ -172,9 +227,6 @@ pub(crate) fn take_samples<'a, T: Copy + Send + Sync + Record>(
     }
     Ok(taken)
 }
-
-/// The factor by which a goal is raised that takes too many samples.
-const RELAXED: f64 = 1.2;
 
 #[cfg(test)]
 mod tests {

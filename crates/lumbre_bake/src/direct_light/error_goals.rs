@@ -63,6 +63,11 @@ impl ErrorGoals {
         (self.total * share - left).max(self.individual)
     }
 
+    /// The share of the quality's budget that shared samples may take.
+    pub fn budget_share(&self) -> f64 {
+        if self.has_gather { BUDGET_SHARE_BESIDE_GATHER } else { 1.0 }
+    }
+
     /// The share of the total for direct light if shared sources need so many samples per texel to reach the least
     /// share.
     pub fn share_for(&self, samples: f64) -> f64 {
@@ -78,6 +83,9 @@ const MAX_SHARED_SHARE: f64 = 0.5;
 /// How many times their goal individually sampled sources may leave beside shared ones and a gather once a round of many
 /// samples has missed it: a fifth of the whole, beside a tenth or more for the shared ones.
 const ENOUGH_OF_THREE: f64 = 2.0;
+/// The share of the quality's budget for shared samples if a gather follows. Beyond it, they lower the error less than
+/// rays of the gather in the same time.
+const BUDGET_SHARE_BESIDE_GATHER: f64 = 0.6;
 /// The share that direct light and the gather may leave together.
 const BOTH_SHARE: f64 = 0.85;
 /// Cost of the gather: its rays per texel times the share of the squared error that they leave. From 7 in a room to 30

@@ -5,6 +5,7 @@
 //! coarse one to the requested one. Sources that do not matter by themselves share samples: that is `shared_light`. So do
 //! lamps where a good part of a block of texels lies in penumbrae.
 
+mod control_variates;
 mod error_goals;
 pub(crate) mod light_cuts;
 pub(crate) mod light_visibility;

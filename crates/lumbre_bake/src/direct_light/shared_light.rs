@@ -1,12 +1,14 @@
 //! Direct light of the sources that share samples, for every covered texel: a few samples everywhere, smoothed over
 //! neighbours that have the same light cut, then more where they are worth most, until direct light leaves no more than
-//! its share of the requested error. Single samples are taken in `sources::shared_samples`; individually sampled
+//! its share of the requested error. Where many more would be needed, `control_variates` lower their
+//! noise. Single samples are taken in `sources::shared_samples`; individually sampled
 //! sources are the parent module's.
 
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::control_variates::{control_cost, mean_controlled_light, variance_left, visible_shares};
 use super::error_goals::ErrorGoals;
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
@@ -16,7 +18,7 @@ use crate::coverage::{Texel, TileSequence, receiver};
 use crate::denoise::replicates::mean;
 use crate::denoise::{Denoised, Estimates, Nearness, Neighbourhoods, REPLICATES};
 use crate::monitor::BakeMonitor;
-use crate::sample_allocation::{SampleAllocator, WeightedGoal, take_samples};
+use crate::sample_allocation::{SampleAllocation, SampleAllocator, WeightedGoal, take_samples};
 use crate::sampling::{Stream, hash};
 use crate::sources::{Direct, Sources};
 use crate::texel_index::CoveredTexel;
@@ -29,6 +31,13 @@ pub(crate) struct SampleSums {
     pub sums: [Vec3; REPLICATES],
     /// Light of mixed lights: the sum of all samples.
     pub mixed: Vec3,
+    /// The control variate of `sums`: for each replicate the sum of what its samples would have brought without
+    /// occluders, for the controlled sources only; mean of the channels.
+    pub controls: [f32; REPLICATES],
+    /// The part of each whose sources were visible.
+    pub visible_controls: [f32; REPLICATES],
+    /// The light of the controlled sources without occluders, if it has been computed.
+    pub controlled_light: Option<Vec3>,
     /// Sum of 1 / distance to the sampled points of sources, canonical units.
     pub inverse_distances: f32,
     /// Samples of each replicate.
@@ -48,11 +57,17 @@ const STALLED: f64 = 0.9;
 /// So is a round that leaves less than this multiple of the goal: smoothing everything once more would cost more than
 /// the rest is worth.
 const ENOUGH: f64 = 1.15;
+/// The least share of a variance that the most doublings of a texel's samples in one round leave.
+const MOST_DOUBLINGS_LEAVE: f64 = 1.0 / 16.0;
+/// A control variate is to save so many times the samples that take as long as it does. More than one, as the rounds
+/// rarely take all the samples that the first one foresees.
+const WORTH_A_CONTROL: f32 = 2.0;
 /// A round's usual share of the time that it and the rounds after it take.
 const PASS: f32 = 0.6;
 
 impl SampleSums {
-    fn estimates(&self) -> Estimates {
+    /// The mean of each replicate's samples.
+    pub fn estimates(&self) -> Estimates {
         self.sums.map(|sum| sum / self.samples.max(1) as f32)
     }
 
@@ -133,6 +148,9 @@ impl<'a> SharedLight<'a> {
                 let [choice, u, v, _] = sequence.point(sample, 1);
                 let light = self.sources.sample(shared, &receiver(scene, &point), [choice, u, v]);
                 *sum += light.baked;
+                sums.controls[replicate] += light.control;
+                sums.visible_controls[replicate] +=
+                    if light.has_ray && !light.hidden { light.control } else { 0.0 };
                 sums.mixed += light.mixed;
                 sums.inverse_distances += light.inverse_distance;
                 sums.rays += u32::from(light.has_ray);
@@ -153,7 +171,14 @@ impl<'a> SharedLight<'a> {
 
     /// Smooths the samples, and estimates the errors of the result.
     fn smooth(&self, monitor: &mut BakeMonitor<'_>) -> Result<Denoised, BakeError> {
-        let raw: Vec<Estimates> = self.sums.par_iter().map(SampleSums::estimates).collect();
+        let raw: Vec<Estimates> = monitor.run_interruptible(0.0, || {
+            if self.sums.iter().all(|sums| sums.controlled_light.is_none()) {
+                return self.sums.par_iter().map(SampleSums::estimates).collect();
+            }
+            let shares = visible_shares(&self.neighbourhoods, &self.sums);
+            let estimates = |(sums, shares): (&SampleSums, _)| sums.controlled_estimates(shares);
+            self.sums.par_iter().zip(shares).map(estimates).collect()
+        })?;
         let nearness = |place: usize| self.sums[place].mean_nearness();
         Denoised::new(&self.neighbourhoods, &raw, nearness, self.options.denoise, monitor)
     }
@@ -168,7 +193,7 @@ impl<'a> SharedLight<'a> {
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
         let least_goal = goals.of_shared(goals.share_for(0.0), left_by_individual);
-        let (mut before, mut chosen_goal) = ([f64::INFINITY; 2], None);
+        let (mut before, mut chosen_goal, mut tried_controls) = ([f64::INFINITY; 2], None, false);
         loop {
             let relative = local.relative_errors(&self.smoothed.errors());
             let is_sampled = |texel: &CoveredTexel| self.sums[texel.place()].samples > 0;
@@ -181,21 +206,15 @@ impl<'a> SharedLight<'a> {
             let samples: Vec<u32> = self.sums.iter().map(|sums| sums.samples).collect();
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
             let count = sampled.len() as u64;
-            let budget = self.options.effort().budget(count) / REPLICATES as u64;
-            let budget = budget.saturating_sub(taken);
+            let budget =
+                goals.budget_share() * self.options.effort().budget(count) as f64 / REPLICATES as f64;
+            let budget = (budget as u64).saturating_sub(taken);
             // Samples are allocated by the cautious errors, but the goal is for the expected ones: scale it.
             let caution = summed(&relative.cautious) / left;
-            let allocator = |variances| SampleAllocator {
-                texels: &sampled,
-                variances,
-                samples: &samples,
-                most: self.most,
-                order: ORDER,
-            };
             // Before a round can reach the least share, a few uncertain texels dominate and the samples of the others
             // cannot be foreseen.
             if chosen_goal.is_none() && left <= MAX_REDUCTION * least_goal {
-                let allocator = allocator(&relative.cautious);
+                let allocator = self.allocator(&sampled, &relative.cautious, &samples);
                 let foreseen = taken + allocator.added(&allocator.within(budget, caution * least_goal));
                 let per_texel = (foreseen * REPLICATES as u64) as f64 / count.max(1) as f64;
                 chosen_goal = Some(goals.of_shared(goals.share_for(per_texel), left_by_individual));
@@ -207,10 +226,22 @@ impl<'a> SharedLight<'a> {
             if !is_open(0) && !is_open(1) {
                 return Ok(());
             }
+            if !tried_controls && budget > 0 {
+                tried_controls = true;
+                let plan = errors.shares(goal, MOST_DOUBLINGS_LEAVE);
+                let plan = WeightedGoal::new(&relative.cautious, &plan, &sampled, ORDER);
+                let plan = self.allocator(&sampled, &plan.variances, &samples).reach(plan.sum);
+                if self.add_controls(&plan, monitor)? {
+                    self.smoothed = self.smooth(monitor)?;
+                    // It was chosen for the samples that would have been needed without control variates.
+                    chosen_goal = None;
+                    continue;
+                }
+            }
             before = sums;
             let shares = errors.shares(goal, MAX_REDUCTION.recip());
             let goal = WeightedGoal::new(&relative.cautious, &shares, &sampled, ORDER);
-            let allocated = allocator(&goal.variances).within(budget, goal.sum);
+            let allocated = self.allocator(&sampled, &goal.variances, &samples).within(budget, goal.sum);
             monitor.pass(PASS);
             let mut sums = std::mem::take(&mut self.sums);
             let taken = take_samples(&allocated, &mut sums, monitor, |to, mut sums| {
@@ -225,6 +256,56 @@ impl<'a> SharedLight<'a> {
         }
     }
 
+    /// Decides on the next samples of some texels. All lists but theirs are per covered texel.
+    fn allocator<'b>(
+        &self,
+        texels: &'b [CoveredTexel],
+        variances: &'b [f32],
+        samples: &'b [u32],
+    ) -> SampleAllocator<'b> {
+        SampleAllocator { texels, variances, samples, most: self.most, order: ORDER }
+    }
+
+    /// Whether a texel is to have so many samples more that its control variate, which would leave a share of the
+    /// variance, saves more of them than it takes.
+    fn is_worth_a_control(&self, to: SampleAllocation, variance_left: f32) -> bool {
+        let more = to.samples.saturating_sub(self.sums[to.texel.place()].samples) * REPLICATES as u32;
+        // Near the sources it takes up to twenty times as long, but there is more to save, too: the noise of some texels
+        // would take far more samples than one round foresees.
+        let cost = self.cuts.of(to.texel).shared.control_cost();
+        more as f32 * (1.0 - variance_left) > WORTH_A_CONTROL * cost as f32
+    }
+
+    /// Computes the control variates of texels that are to have so many samples, where they are worth it and as far as
+    /// there is time. Returns whether there are any.
+    fn add_controls(
+        &mut self,
+        planned: &[SampleAllocation],
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<bool, BakeError> {
+        let texels: Vec<CoveredTexel> = monitor.run_interruptible(1.0, || {
+            let left_of_blocks = variance_left(&self.neighbourhoods, &self.sums, &self.cuts.blocks);
+            let worth_it = |to: &&SampleAllocation| {
+                let left = left_of_blocks[self.cuts.block(to.texel) as usize];
+                let is_new = self.sums[to.texel.place()].controlled_light.is_none();
+                is_new && self.is_worth_a_control(**to, left)
+            };
+            planned.par_iter().filter(worth_it).map(|to| to.texel).collect()
+        })?;
+        if texels.is_empty() {
+            return Ok(false);
+        }
+        monitor.pass(PASS);
+        let lights = in_chunks_until_deadline(texels.len(), monitor, |index| {
+            let (texel, shared) = (texels[index], &self.cuts.of(texels[index]).shared);
+            mean_controlled_light(self.sources, shared, &self.texels[texel.place()])
+        })?;
+        for (texel, light) in texels.iter().zip(&lights) {
+            self.sums[texel.place()].controlled_light = Some(*light);
+        }
+        Ok(!lights.is_empty())
+    }
+
     /// Adds the smoothed light to that of the individually sampled sources.
     pub fn add_to(self, direct: &mut [Direct]) {
         let (variances, Denoised { estimates, .. }) = (self.smoothed.errors(), self.smoothed);
@@ -237,6 +318,11 @@ impl<'a> SharedLight<'a> {
                 direct.caution += variance - variances.expected[place];
                 direct.rays += sums.rays;
                 direct.samples_without_ray += (sums.samples * REPLICATES as u32).saturating_sub(sums.rays);
+                if sums.controlled_light.is_some() {
+                    // So that the gather knows how much of the time it has taken.
+                    let shared = &self.cuts.of(CoveredTexel::new(place)).shared;
+                    direct.samples_without_ray += control_cost(self.sources, shared, &self.texels[place]);
+                }
                 direct.sampled = true;
             }
         }

@@ -171,7 +171,7 @@ impl Sources<'_> {
             let emitter = &self.emitters[emitter as usize];
             let Some(sample) = sample_emitter(emitter, &receiver, (u, v)) else { continue };
             let light = sample.light / probability;
-            if !light.is_finite() {
+            if sample.is_below_facet || !light.is_finite() {
                 continue;
             }
             all += light;

@@ -19,7 +19,8 @@ pub(crate) struct Direct {
     pub caution: f32,
     /// Number of rays cast.
     pub rays: u32,
-    /// Number of samples shared by sources that cast no ray, as they could bring no light. Counted for texels only.
+    /// Number of samples shared by sources that cast no ray, as they could bring no light, and the number of samples that
+    /// take as long as the control variate. Counted for texels only.
     pub samples_without_ray: u32,
     /// Whether it was estimated from samples, so that more samples would improve it.
     pub sampled: bool,

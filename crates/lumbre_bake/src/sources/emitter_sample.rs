@@ -13,9 +13,13 @@ pub(crate) struct EmitterSample {
     /// The unoccluded irradiance by this point over its probability density: an estimate for the whole emitter.
     pub light: Vec3,
     pub distance: f32,
+    /// Whether it lies below the receiver's facet although above the horizon of its shading normal: then none of the
+    /// light arrives.
+    pub is_below_facet: bool,
 }
 
-/// Samples an emitter at (u, v) of the unit square; `None` if the point sends no light to the receiver.
+/// Samples an emitter at (u, v) of the unit square; `None` if the point is below the horizon of the receiver's shading
+/// normal, or the receiver behind the emitter.
 pub(crate) fn sample_emitter(
     emitter: &Emitter,
     receiver: &Receiver,
@@ -46,15 +50,16 @@ pub(crate) fn sample_emitter(
     let distance_squared = towards.length_squared();
     let direction = towards.normalize_or_zero();
     let (cosine, emitted) = (direction.dot(receiver.normal), -direction.dot(emitter.normal));
-    if cosine <= 0.0 || emitted <= 0.0 || direction.dot(receiver.geometric_normal) <= 0.0 {
+    if cosine <= 0.0 || emitted <= 0.0 {
         return None;
     }
+    let is_below_facet = direction.dot(receiver.geometric_normal) <= 0.0;
     if by_direction.is_none() {
         per_cosine = emitted * emitter.area / distance_squared;
     }
     let target = receiver.position + towards;
     let light = emitter.radiance * (cosine * per_cosine);
-    Some(EmitterSample { target, light, distance: distance_squared.sqrt() })
+    Some(EmitterSample { target, light, distance: distance_squared.sqrt(), is_below_facet })
 }
 
 /// Ratio of an emitter's area to its squared distance from which on it is sampled by solid angle.

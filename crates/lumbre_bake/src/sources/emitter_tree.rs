@@ -164,6 +164,12 @@ impl EmitterTree {
         apparent_sine(bounds.center, bounds.radius, receiver, reach)
     }
 
+    /// The distance from a receiver to a node's bounding sphere; 0 inside.
+    pub fn distance(&self, index: u32, receiver: &Receiver) -> f32 {
+        let bounds = &self.bounds[index as usize];
+        (bounds.center.distance(receiver.position) - bounds.radius).max(0.0)
+    }
+
     /// Estimates the unoccluded form factor from a receiver to all emitters together, from 0 to about 1. A distant node
     /// counts as one area at its centre; near nodes are opened, and none counts for more than its bounding sphere.
     pub fn form_factor(&self, receiver: &Receiver) -> f32 {
@@ -217,9 +223,16 @@ impl EmitterTree {
 
     /// Irradiance that a node brings to a receiver, ignoring occlusion.
     pub fn unoccluded(&self, emitters: &[Emitter], index: u32, receiver: &Receiver) -> Vec3 {
-        let opening = if self.emitters(index) <= EXACT_EMITTERS { 0.0 } else { OPENING };
         let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
         let mut sum = DVec3::ZERO;
+        if self.emitters(index) <= EXACT_EMITTERS {
+            for &emitter in self.emitters_of(index) {
+                let emitter = &emitters[emitter as usize];
+                let factor = point_to_triangle(position, normal, &emitter.corners_f64);
+                sum += emitter.radiance.as_dvec3() * (std::f64::consts::PI * factor);
+            }
+            return sum.as_vec3();
+        }
         let mut open = Vec::with_capacity(64);
         open.push(index);
         while let Some(index) = open.pop() {
@@ -239,7 +252,7 @@ impl EmitterTree {
                 continue;
             }
             let distance = towards.length();
-            if bounds.radius < opening * distance && height > bounds.radius {
+            if bounds.radius < OPENING * distance && height > bounds.radius {
                 let direction = towards / distance;
                 let (faces, may_differ) =
                     (-direction.dot(bounds.axis), bounds.spread + bounds.radius / distance);

@@ -6,11 +6,14 @@
 
 use std::collections::BinaryHeap;
 
+use lumbre_optics::BakeMode;
+
 use super::emitter_bounds::BoundsLanes;
+use super::emitter_tree::EXACT_EMITTERS;
 use super::light_sources::Sources;
 use super::source_tree::{clamp_below_one, pick};
 use crate::sampling::interval_at;
-use crate::scene::Receiver;
+use crate::scene::{PlacedLight, Receiver};
 
 /// How the sources are sampled at a piece of surface. Sources in none of the lists bring no light there.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,12 +31,34 @@ pub(crate) struct LightCut {
 /// The sources that share samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct SharedSources {
-    /// Nodes of the trees, each with the cumulative sum of the probabilities; the last sum is 1.
-    branches: Vec<(Branch, f32)>,
+    /// In the order of the trees.
+    branches: Vec<SharedBranch>,
+    /// Number of sources of the controlled branches.
+    controlled: u32,
     /// Whether some node is so near that the probabilities must be computed for each receiver.
     near: bool,
     /// If `near`, the bounds of the first branches: the nodes of the emitter tree.
     bounds: BoundsLanes,
+}
+
+/// A node of sources that share samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct SharedBranch {
+    branch: Branch,
+    /// The cumulative sum of the probabilities up to this node; the last one is 1.
+    end: f32,
+    is_controlled: bool,
+}
+
+/// A sampled branch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BranchChoice {
+    pub branch: Branch,
+    /// The random number, rescaled from the branch's interval to [0, 1) for reuse.
+    pub u: f32,
+    pub probability: f32,
+    /// Whether the branch is one of [`SharedSources::controlled`].
+    pub is_controlled: bool,
 }
 
 /// A node of one of the two trees.
@@ -48,21 +73,42 @@ impl SharedSources {
     pub fn is_empty(&self) -> bool {
         self.branches.is_empty()
     }
+
+    /// The branches whose unoccluded light is cheap to compute exactly at a point, so that it can serve as a control variate
+    /// of the samples: the brightest ones of few emitters, and lights without a size or a cone.
+    pub fn controlled(&self) -> impl Iterator<Item = Branch> {
+        self.branches.iter().filter(|shared| shared.is_controlled).map(|shared| shared.branch)
+    }
+
+    /// Whether receivers estimate the light of the branches anew.
+    #[cfg(test)]
+    pub fn is_near(&self) -> bool {
+        self.near
+    }
+
+    /// The number of samples that take about as long as the unoccluded light of the controlled branches at a point.
+    pub fn control_cost(&self) -> u32 {
+        self.controlled.div_ceil(CONTROLLED_PER_SAMPLE)
+    }
 }
 
 impl Sources<'_> {
-    /// Samples a branch of the shared sources by `u` in [0, 1). Returns the branch, `u` rescaled from the branch's
-    /// interval to [0, 1), and the branch's probability.
+    /// Samples a branch of the shared sources by `u` in [0, 1).
     pub(crate) fn pick_branch(
         &self,
         shared: &SharedSources,
         receiver: &Receiver,
         u: f32,
-    ) -> Option<(Branch, f32, f32)> {
+    ) -> Option<BranchChoice> {
+        let choice = |place: usize, u: f32, probability: f32| {
+            let SharedBranch { branch, is_controlled, .. } = shared.branches[place];
+            BranchChoice { branch, u, probability, is_controlled }
+        };
         if shared.near {
             let mut weights = [0.0f32; MAX_NEAR_BRANCHES];
             shared.bounds.weights(receiver, &mut weights);
-            for (weight, (branch, _)) in weights.iter_mut().zip(&shared.branches).skip(shared.bounds.len()) {
+            let unbounded = weights.iter_mut().zip(&shared.branches).skip(shared.bounds.len());
+            for (weight, SharedBranch { branch, .. }) in unbounded {
                 *weight = self.weight(*branch, receiver, 0.0);
             }
             let weights = &weights[..shared.branches.len()];
@@ -70,11 +116,11 @@ impl Sources<'_> {
                 return None;
             }
             let (place, probability, u) = pick(weights, u);
-            return Some((shared.branches[place].0, u, probability));
+            return Some(choice(place, u, probability));
         }
-        let (place, start, end) = interval_at(&shared.branches, |(_, end)| *end, u)?;
+        let (place, start, end) = interval_at(&shared.branches, |shared| shared.end, u)?;
         let probability = (end - start).max(f32::MIN_POSITIVE);
-        Some((shared.branches[place].0, clamp_below_one((u - start) / probability), probability))
+        Some(choice(place, clamp_below_one((u - start) / probability), probability))
     }
 }
 
@@ -118,6 +164,11 @@ const NEAR: f32 = 0.5;
 const OPENED_NEAR: f32 = 0.005;
 /// [`MAX_BRANCHES`] for near nodes.
 const MAX_NEAR_BRANCHES: usize = 48;
+
+/// Most sources whose unoccluded light serves as a control variate.
+const MAX_CONTROLLED: u32 = 96;
+/// The number of sources whose unoccluded light takes as long as one sample.
+const CONTROLLED_PER_SAMPLE: u32 = 8;
 
 /// A node with its estimated light.
 #[derive(Clone, Copy, PartialEq)]
@@ -215,15 +266,17 @@ impl Sources<'_> {
     /// Nodes that share samples, each with a probability in proportion to its estimated light. Where some are `near`,
     /// receivers estimate that anew.
     fn shared_sources(&self, mut nodes: Vec<Weighted>, near: bool) -> SharedSources {
+        let (branches, controlled) = self.controlled_branches(&nodes);
         // Tree order, so that neighbours in the list are neighbours in space.
         nodes.sort_unstable_by_key(|node| node.branch);
         let sum: f64 = nodes.iter().map(|node| f64::from(node.weight)).sum();
-        let mut shared = SharedSources { near, ..SharedSources::default() };
+        let mut shared = SharedSources { near, controlled, ..SharedSources::default() };
         let (mut running, last) = (0.0, nodes.len().saturating_sub(1));
         for (place, node) in nodes.iter().enumerate() {
             running += f64::from(node.weight);
             let end = if place == last { 1.0 } else { (running / sum) as f32 };
-            shared.branches.push((node.branch, end));
+            let is_controlled = branches.contains(&node.branch);
+            shared.branches.push(SharedBranch { branch: node.branch, end, is_controlled });
         }
         if near {
             let bounds = |node: &Weighted| match node.branch {
@@ -233,6 +286,29 @@ impl Sources<'_> {
             shared.bounds = BoundsLanes::new(&nodes.iter().map_while(bounds).collect::<Vec<_>>());
         }
         shared
+    }
+
+    /// The branches of [`SharedSources::controlled`] among some nodes that share samples, and the number of their sources.
+    fn controlled_branches(&self, nodes: &[Weighted]) -> (Vec<Branch>, u32) {
+        let mut nodes = nodes.to_vec();
+        nodes.sort_unstable_by(|a, b| b.cmp(a));
+        let mut left = MAX_CONTROLLED;
+        let mut is_controlled = |branch: Branch| {
+            let sources = match branch {
+                Branch::Emitters(node) => self.emitter_tree.emitters(node),
+                Branch::Lights(node) => match self.light_tree.children(node) {
+                    Err(light) if has_simple_light(&self.lights[light as usize]) => 1,
+                    _ => return false,
+                },
+            };
+            // The light of more emitters is approximated.
+            let is_cheap = sources <= EXACT_EMITTERS && sources <= left;
+            left -= if is_cheap { sources } else { 0 };
+            is_cheap
+        };
+        let branches =
+            nodes.into_iter().map(|node| node.branch).filter(|branch| is_controlled(*branch)).collect();
+        (branches, MAX_CONTROLLED - left)
     }
 
     /// The nodes of all lamps, if those are to be sampled individually: if they are few, or fill most of what the
@@ -286,4 +362,11 @@ impl Sources<'_> {
             Branch::Lights(node) => self.light_tree.sine(node, receiver, reach),
         }
     }
+}
+
+/// Whether a light's baked light is known exactly at a point, and changes little over a texel: not where it has a size, or
+/// the narrow edge of a cone.
+fn has_simple_light(placed: &PlacedLight) -> bool {
+    let has_cone = placed.light.spot.is_some_and(|cone| !cone.is_everywhere());
+    placed.light.bake == BakeMode::Static && !placed.is_sized() && !has_cone
 }

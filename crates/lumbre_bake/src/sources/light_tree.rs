@@ -85,6 +85,12 @@ impl LightTree {
         apparent_sine(node.center, node.radius, receiver, reach)
     }
 
+    /// The distance from a receiver to a node's bounding sphere; 0 inside.
+    pub fn distance(&self, index: u32, receiver: &Receiver) -> f32 {
+        let node = &self.nodes[index as usize];
+        (node.center.distance(receiver.position) - node.radius).max(0.0)
+    }
+
     /// Samples a light of a node by `u` in [0, 1), about in proportion to the light that it brings to the receiver;
     /// also returns its probability. `None` if the descent reaches a node none of whose lights reaches as far as the
     /// receiver.
