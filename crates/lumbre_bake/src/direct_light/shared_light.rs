@@ -1,8 +1,7 @@
 //! Direct light of the sources that share samples, for every covered texel: a few samples everywhere, smoothed over
 //! neighbours that have the same light cut, then more where they are worth most, until direct light leaves no more than
-//! its share of the requested error. Where many more would be needed, `control_variates` lower their
-//! noise. Single samples are taken in `sources::shared_samples`; individually sampled
-//! sources are the parent module's.
+//! its share of the requested error. Where many more would be needed, `control_variates` lower their noise. Single samples
+//! are taken in `sources::shared_samples`; individually sampled sources are the parent module's.
 
 use glam::Vec3;
 use rayon::prelude::*;
