@@ -65,6 +65,8 @@ pub(crate) struct SampleAllocator<'a> {
 const CHUNK: usize = 4096;
 /// The most times that one round doubles a texel's samples: a variance from few samples cannot be trusted further.
 const MAX_DOUBLINGS: usize = 3;
+/// About the share of a squared error that so many doublings leave: a round that aims at less cannot reach it.
+pub(crate) const MOST_DOUBLINGS_LEAVE: f64 = 1.0 / 16.0;
 /// The factor by which the search for the least worth of a sample goes down from the highest worth.
 const FACTOR: f64 = 4.0;
 /// The lowest value that is searched, as a share of the highest.

@@ -7,6 +7,8 @@ pub(crate) mod covered_texels;
 pub(crate) mod divided_texels;
 pub(crate) mod footprint;
 pub(crate) mod hidden;
+#[cfg(test)]
+pub(crate) mod on_a_floor;
 pub(crate) mod texel_geometry;
 pub(crate) mod texel_groups;
 pub(crate) mod tile_sequence;

@@ -44,19 +44,12 @@ impl Denoised {
 
 #[cfg(test)]
 mod tests {
-    use std::ops::ControlFlow;
-    use std::sync::Arc;
-
-    use glam::{Vec2, Vec3};
-    use lumbre_mesh::TriangleMesh;
+    use glam::Vec3;
 
     use super::super::neighbours_tests::random;
     use super::super::replicates::{REPLICATES, mean, variance};
     use super::*;
-    use crate::coverage::CoveredTexels;
-    use crate::scene::laid_out::laid_out;
-    use crate::scene::{PlacedPrimitive, SceneObject, StaticScene};
-    use crate::{BakeOptions, Density};
+    use crate::coverage::on_a_floor::on_a_floor;
 
     const SIDE: u32 = 192;
 
@@ -74,53 +67,39 @@ mod tests {
 
     /// Replicates of the `light` at each texel (column, row) of a floor, with noise of this standard deviation.
     fn left(light: impl Fn(u32, u32) -> f32, noise: f32, distance: f32, smooths: bool) -> Left {
-        let floor = TriangleMesh {
-            positions: vec![Vec3::ZERO, Vec3::Z, Vec3::X + Vec3::Z, Vec3::X],
-            normals: vec![Vec3::Y; 4],
-            uv1: vec![Vec2::ZERO, Vec2::Y, Vec2::ONE, Vec2::X],
-            indices: vec![0, 1, 2, 0, 2, 3],
-            ..TriangleMesh::default()
-        };
-        let placed = PlacedPrimitive { mesh: Arc::new(floor), ..PlacedPrimitive::default() };
-        let input =
-            StaticScene { objects: vec![SceneObject::new("", vec![placed])], ..StaticScene::default() };
-        let input = input.checked().unwrap();
-        let options = BakeOptions { density: Density::MapSize(SIDE), ..BakeOptions::default() };
-        let (layout, scene) = laid_out(&input.objects, input.space(), &options);
-        let mut carry_on = |_| ControlFlow::Continue(());
-        let mut monitor = BakeMonitor::new(&mut carry_on, None);
-        let (texels, _) = CoveredTexels::new(&scene, &layout, &mut monitor).unwrap();
-        let mut state = 5;
-        // A sum of twelve numbers, each with a variance of 1/12, is almost normally distributed.
-        let mut normal = || (0..12).map(|_| random(&mut state)).sum::<f32>() - 6.0;
-        let truth: Vec<f32> = texels.list.iter().map(|texel| light(texel.x, texel.y)).collect();
-        let mut raw: Vec<Estimates> = Vec::new();
-        for light in &truth {
-            raw.push(std::array::from_fn::<_, REPLICATES, _>(|_| Vec3::splat(light + noise * normal())));
-        }
-        let neighbourhoods = Neighbourhoods::new(&texels, &[]);
-        let denoised = Denoised::new(
-            &neighbourhoods,
-            &raw,
-            |_| Nearness::of_lamp((distance * texels.side).recip()),
-            smooths,
-            &mut monitor,
-        )
-        .unwrap();
-        let count = truth.len() as f32;
-        assert!(count > 0.9 * (SIDE * SIDE) as f32, "{count}");
-        let off = |place: usize| mean(&denoised.estimates[place]).x - truth[place];
-        let all = 0..truth.len();
-        let share = |squared: &dyn Fn(usize) -> f32| {
-            all.clone().filter(|&place| off(place).powi(2) <= 4.0 * squared(place)).count() as f32 / count
-        };
-        Left {
-            error: all.clone().map(|place| off(place).powi(2)).sum::<f32>() / count,
-            noise: denoised.noise.expected.iter().sum::<f32>() / count,
-            smoothing: denoised.smoothing.iter().sum::<f32>() / count,
-            within_cautious: share(&|place| denoised.noise.cautious[place]),
-            within_own: share(&|place| variance(&denoised.estimates[place]).x),
-        }
+        on_a_floor(SIDE, |texels, monitor| {
+            let mut state = 5;
+            // A sum of twelve numbers, each with a variance of 1/12, is almost normally distributed.
+            let mut normal = || (0..12).map(|_| random(&mut state)).sum::<f32>() - 6.0;
+            let truth: Vec<f32> = texels.list.iter().map(|texel| light(texel.x, texel.y)).collect();
+            let mut raw: Vec<Estimates> = Vec::new();
+            for light in &truth {
+                raw.push(std::array::from_fn::<_, REPLICATES, _>(|_| Vec3::splat(light + noise * normal())));
+            }
+            let neighbourhoods = Neighbourhoods::new(texels, &[]);
+            let denoised = Denoised::new(
+                &neighbourhoods,
+                &raw,
+                |_| Nearness::of_lamp((distance * texels.side).recip()),
+                smooths,
+                monitor,
+            )
+            .unwrap();
+            let count = truth.len() as f32;
+            assert!(count > 0.9 * (SIDE * SIDE) as f32, "{count}");
+            let off = |place: usize| mean(&denoised.estimates[place]).x - truth[place];
+            let all = 0..truth.len();
+            let share = |squared: &dyn Fn(usize) -> f32| {
+                all.clone().filter(|&place| off(place).powi(2) <= 4.0 * squared(place)).count() as f32 / count
+            };
+            Left {
+                error: all.clone().map(|place| off(place).powi(2)).sum::<f32>() / count,
+                noise: denoised.noise.expected.iter().sum::<f32>() / count,
+                smoothing: denoised.smoothing.iter().sum::<f32>() / count,
+                within_cautious: share(&|place| denoised.noise.cautious[place]),
+                within_own: share(&|place| variance(&denoised.estimates[place]).x),
+            }
+        })
     }
 
     #[test]

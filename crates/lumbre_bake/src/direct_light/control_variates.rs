@@ -141,7 +141,10 @@ pub(crate) fn variance_left(
     let around = neighbourhoods.sums(terms, NOISE_STEPS, 1);
     let of_block = |members: &Vec<CoveredTexel>| {
         let sum = |first: usize| {
-            members.iter().map(|texel| spread(&around[texel.place()][first..][..REPLICATES])).sum::<f32>()
+            members
+                .iter()
+                .map(|texel| squared_deviations(&around[texel.place()][first..][..REPLICATES]))
+                .sum::<f32>()
         };
         let (plain, controlled) = (sum(0), sum(REPLICATES));
         if plain > 0.0 { (controlled / plain).min(1.0) } else { 1.0 }
@@ -150,7 +153,7 @@ pub(crate) fn variance_left(
 }
 
 /// The sum of the squared differences of numbers from their mean.
-fn spread(numbers: &[f32]) -> f32 {
+fn squared_deviations(numbers: &[f32]) -> f32 {
     let mean = numbers.iter().sum::<f32>() / numbers.len() as f32;
     numbers.iter().map(|number| (number - mean).powi(2)).sum()
 }
@@ -176,44 +179,15 @@ impl SampleSums {
 
 #[cfg(test)]
 mod tests {
-    use std::ops::ControlFlow;
-    use std::sync::Arc;
-
-    use glam::Vec2;
-    use lumbre_mesh::TriangleMesh;
-
     use super::*;
-    use crate::coverage::CoveredTexels;
-    use crate::monitor::BakeMonitor;
+    use crate::coverage::on_a_floor::on_a_floor;
     use crate::sampling::hash;
-    use crate::scene::laid_out::laid_out;
-    use crate::scene::{PlacedPrimitive, SceneObject, StaticScene};
-    use crate::{BakeOptions, Density};
 
+    /// Texels along the floor's side.
     const SIDE: u32 = 64;
     const SAMPLES: u32 = 2;
     /// The mean light where bright sources are more visible than dim ones: of a light c, uniform in [0.5, 1.5], c/2 of it.
     const PARTLY_VISIBLE: f32 = 0.5 * (1.0 + 1.0 / 12.0);
-
-    /// Calls `check` with a floor of [`SIDE`] x [`SIDE`] texels.
-    fn on_a_floor(check: impl FnOnce(&CoveredTexels<'_>)) {
-        let floor = TriangleMesh {
-            positions: vec![Vec3::ZERO, Vec3::Z, Vec3::X + Vec3::Z, Vec3::X],
-            normals: vec![Vec3::Y; 4],
-            uv1: vec![Vec2::ZERO, Vec2::Y, Vec2::ONE, Vec2::X],
-            indices: vec![0, 1, 2, 0, 2, 3],
-            ..TriangleMesh::default()
-        };
-        let placed = PlacedPrimitive { mesh: Arc::new(floor), ..PlacedPrimitive::default() };
-        let objects = vec![SceneObject::new("floor", vec![placed])];
-        let input = StaticScene { objects, ..StaticScene::default() }.checked().unwrap();
-        let options = BakeOptions { density: Density::MapSize(SIDE), ..BakeOptions::default() };
-        let (layout, scene) = laid_out(&input.objects, input.space(), &options);
-        let mut carry_on = |_| ControlFlow::Continue(());
-        let mut monitor = BakeMonitor::new(&mut carry_on, None);
-        let (texels, _) = CoveredTexels::new(&scene, &layout, &mut monitor).unwrap();
-        check(&texels);
-    }
 
     /// A random number in [0, 1) for each texel, replicate and purpose.
     fn random(place: usize, replicate: usize, purpose: u32) -> f32 {
@@ -239,7 +213,7 @@ mod tests {
 
     #[test]
     fn the_noise_that_both_have_in_common_cancels_and_the_mean_stays() {
-        on_a_floor(|texels| {
+        on_a_floor(SIDE, |texels, _| {
             let neighbourhoods = Neighbourhoods::new(texels, &[]);
             let sampled_at = |(place, texel): (usize, &Texel)| sampled(texel, place);
             let mut sums: Vec<SampleSums> = texels.list.iter().enumerate().map(sampled_at).collect();
@@ -269,7 +243,7 @@ mod tests {
 
     #[test]
     fn what_control_variates_would_leave_is_foreseen() {
-        on_a_floor(|texels| {
+        on_a_floor(SIDE, |texels, _| {
             let neighbourhoods = Neighbourhoods::new(texels, &[]);
             let sampled_at = |(place, texel): (usize, &Texel)| sampled(texel, place);
             let sums: Vec<SampleSums> = texels.list.iter().enumerate().map(sampled_at).collect();

@@ -17,7 +17,9 @@ use crate::coverage::{Texel, TileSequence, receiver};
 use crate::denoise::replicates::mean;
 use crate::denoise::{Denoised, Estimates, Nearness, Neighbourhoods, REPLICATES};
 use crate::monitor::BakeMonitor;
-use crate::sample_allocation::{SampleAllocation, SampleAllocator, WeightedGoal, take_samples};
+use crate::sample_allocation::{
+    MOST_DOUBLINGS_LEAVE, SampleAllocation, SampleAllocator, WeightedGoal, take_samples,
+};
 use crate::sampling::{Stream, hash};
 use crate::sources::{Direct, Sources};
 use crate::texel_index::CoveredTexel;
@@ -56,8 +58,6 @@ const STALLED: f64 = 0.9;
 /// So is a round that leaves less than this multiple of the goal: smoothing everything once more would cost more than
 /// the rest is worth.
 const ENOUGH: f64 = 1.15;
-/// The least share of a variance that the most doublings of a texel's samples in one round leave.
-const MOST_DOUBLINGS_LEAVE: f64 = 1.0 / 16.0;
 /// A control variate is to save so many times the samples that take as long as it does. More than one, as the rounds
 /// rarely take all the samples that the first one foresees.
 const WORTH_A_CONTROL: f32 = 2.0;

@@ -12,7 +12,9 @@ use crate::chunks::{decide, in_chunks};
 use crate::coverage::{CoveredTexels, Texel, receiver};
 use crate::denoise::Neighbourhoods;
 use crate::monitor::BakeMonitor;
-use crate::sample_allocation::{SampleAllocation, SampleAllocator, WeightedGoal, take_samples};
+use crate::sample_allocation::{
+    MOST_DOUBLINGS_LEAVE, SampleAllocation, SampleAllocator, WeightedGoal, take_samples,
+};
 use crate::sampling::{Sequence, Stream};
 use crate::sources::{Direct, SampledReceiver, Sources, VisibilitySummary};
 use crate::texel_index::{CoveredTexel, MapTexel};
@@ -229,7 +231,8 @@ impl<'a> SourceSampler<'a> {
                 return Ok(());
             }
             let (texels, samples) = (&light.doubtful, &light.samples);
-            let goal = WeightedGoal::new(&variances, &errors.shares(goal, LEAST_SHARE), texels, ORDER);
+            let goal =
+                WeightedGoal::new(&variances, &errors.shares(goal, MOST_DOUBLINGS_LEAVE), texels, ORDER);
             let allocator =
                 SampleAllocator { texels, variances: &goal.variances, samples, most, order: ORDER };
             let allocated = allocator.reach(goal.sum);
@@ -295,10 +298,6 @@ pub(crate) const ORDER: f64 = 1.5;
 /// straight edges: behind a grille, a second such round took a tenth of the bake and lowered the squared error from 1.7
 /// to 1.6 times the goal.
 const MANY_SAMPLES: u64 = 2;
-
-/// The least share of a squared error that a pass aims to leave: about what the most doublings of samples in one pass
-/// leave.
-const LEAST_SHARE: f64 = 1.0 / 16.0;
 
 /// A pass's usual share of the time that it and the passes after it take.
 const PASS: f32 = 0.5;

@@ -11,7 +11,7 @@ use glam::{DVec3, Mat3, Vec3};
 use super::emitter_bounds::EmitterBounds;
 use super::emitter_walk::{EmitterChoice, EmitterWalk};
 use super::emitters::Emitter;
-use super::source_tree::{NodeKind, apparent_sine, split_at_median};
+use super::source_tree::{NodeKind, apparent_sine, distance_to_sphere, split_at_median};
 use crate::scene::Receiver;
 use crate::visibility::polygon::point_to_triangle;
 
@@ -167,7 +167,7 @@ impl EmitterTree {
     /// The distance from a receiver to a node's bounding sphere; 0 inside.
     pub fn distance(&self, index: u32, receiver: &Receiver) -> f32 {
         let bounds = &self.bounds[index as usize];
-        (bounds.center.distance(receiver.position) - bounds.radius).max(0.0)
+        distance_to_sphere(bounds.center, bounds.radius, receiver)
     }
 
     /// Estimates the unoccluded form factor from a receiver to all emitters together, from 0 to about 1. A distant node
@@ -224,24 +224,22 @@ impl EmitterTree {
     /// Irradiance that a node brings to a receiver, ignoring occlusion.
     pub fn unoccluded(&self, emitters: &[Emitter], index: u32, receiver: &Receiver) -> Vec3 {
         let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
-        let mut sum = DVec3::ZERO;
+        let light_of = |emitter: u32| {
+            let emitter = &emitters[emitter as usize];
+            let factor = point_to_triangle(position, normal, &emitter.corners_f64);
+            emitter.radiance.as_dvec3() * (std::f64::consts::PI * factor)
+        };
         if self.emitters(index) <= EXACT_EMITTERS {
-            for &emitter in self.emitters_of(index) {
-                let emitter = &emitters[emitter as usize];
-                let factor = point_to_triangle(position, normal, &emitter.corners_f64);
-                sum += emitter.radiance.as_dvec3() * (std::f64::consts::PI * factor);
-            }
-            return sum.as_vec3();
+            return self.emitters_of(index).iter().map(|emitter| light_of(*emitter)).sum::<DVec3>().as_vec3();
         }
+        let mut sum = DVec3::ZERO;
         let mut open = Vec::with_capacity(64);
         open.push(index);
         while let Some(index) = open.pop() {
             let (node, bounds) = (&self.nodes[index as usize], &self.bounds[index as usize]);
             let children = match node.kind {
                 NodeKind::Leaf(emitter) => {
-                    let emitter = &emitters[emitter as usize];
-                    let factor = point_to_triangle(position, normal, &emitter.corners_f64);
-                    sum += emitter.radiance.as_dvec3() * (std::f64::consts::PI * factor);
+                    sum += light_of(emitter);
                     continue;
                 }
                 NodeKind::Inner(children) => children,

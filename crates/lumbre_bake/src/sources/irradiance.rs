@@ -50,16 +50,14 @@ impl Sources<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use glam::Vec3;
     use lumbre_mesh::shapes;
 
     use crate::BakeOptions;
     use crate::Density;
     use crate::sampling::{Sequence, Stream};
-    use crate::scene::laid_out::laid_out;
-    use crate::scene::{PlacedPrimitive, Receiver, SceneObject, Side, StaticScene};
+    use crate::scene::laid_out::mesh_laid_out;
+    use crate::scene::{Receiver, Side};
     use crate::sources::{Emitter, Sources};
 
     /// Faces of a lamp that is red, green and, on the side that faces away, blue.
@@ -87,12 +85,8 @@ mod tests {
     /// one of the colours, and its first sample may meet a face that brings no light.
     #[test]
     fn one_ray_to_a_lamp_of_several_colors_gives_its_exact_light() {
-        let floor =
-            PlacedPrimitive { mesh: Arc::new(shapes::plane(2.0, 2.0, 1, 1)), ..PlacedPrimitive::default() };
-        let objects = vec![SceneObject::new("floor", vec![floor])];
-        let input = StaticScene { objects, ..StaticScene::default() }.checked().unwrap();
         let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
-        let (_, scene) = laid_out(&input.objects, input.space(), &options);
+        let (_, scene) = mesh_laid_out(shapes::plane(2.0, 2.0, 1, 1), &options);
         let sources = Sources::new(&scene, lamp_of_three_colors(), Vec::new(), Vec3::ZERO);
         let position = Vec3::new(0.1, 1.0, 0.0);
         let receiver = Receiver { position, origin: position, geometric_normal: Vec3::Y, normal: Vec3::Y };

@@ -263,52 +263,48 @@ impl Sources<'_> {
         (closed, total)
     }
 
-    /// Nodes that share samples, each with a probability in proportion to its estimated light. Where some are `near`,
-    /// receivers estimate that anew.
-    fn shared_sources(&self, mut nodes: Vec<Weighted>, near: bool) -> SharedSources {
-        let (branches, controlled) = self.controlled_branches(&nodes);
-        // Tree order, so that neighbours in the list are neighbours in space.
-        nodes.sort_unstable_by_key(|node| node.branch);
+    /// Nodes that share samples, from the brightest to the dimmest, each with a probability in proportion to its estimated
+    /// light. Where some are `near`, receivers estimate that anew.
+    fn shared_sources(&self, nodes: Vec<Weighted>, near: bool) -> SharedSources {
         let sum: f64 = nodes.iter().map(|node| f64::from(node.weight)).sum();
+        let mut left = MAX_CONTROLLED;
+        let with_control = |node: Weighted| {
+            let sources = self.controllable_sources(node.branch).filter(|sources| *sources <= left);
+            left -= sources.unwrap_or(0);
+            (node, sources.is_some())
+        };
+        let mut nodes: Vec<(Weighted, bool)> = nodes.into_iter().map(with_control).collect();
+        // Tree order, so that neighbours in the list are neighbours in space.
+        nodes.sort_unstable_by_key(|(node, _)| node.branch);
+        let controlled = MAX_CONTROLLED - left;
         let mut shared = SharedSources { near, controlled, ..SharedSources::default() };
         let (mut running, last) = (0.0, nodes.len().saturating_sub(1));
-        for (place, node) in nodes.iter().enumerate() {
-            running += f64::from(node.weight);
+        for (place, &(Weighted { weight, branch }, is_controlled)) in nodes.iter().enumerate() {
+            running += f64::from(weight);
             let end = if place == last { 1.0 } else { (running / sum) as f32 };
-            let is_controlled = branches.contains(&node.branch);
-            shared.branches.push(SharedBranch { branch: node.branch, end, is_controlled });
+            shared.branches.push(SharedBranch { branch, end, is_controlled });
         }
         if near {
-            let bounds = |node: &Weighted| match node.branch {
+            let bounds = |shared: &SharedBranch| match shared.branch {
                 Branch::Emitters(node) => Some(self.emitter_tree.bounds(node)),
                 Branch::Lights(_) => None,
             };
-            shared.bounds = BoundsLanes::new(&nodes.iter().map_while(bounds).collect::<Vec<_>>());
+            shared.bounds = BoundsLanes::new(&shared.branches.iter().map_while(bounds).collect::<Vec<_>>());
         }
         shared
     }
 
-    /// The branches of [`SharedSources::controlled`] among some nodes that share samples, and the number of their sources.
-    fn controlled_branches(&self, nodes: &[Weighted]) -> (Vec<Branch>, u32) {
-        let mut nodes = nodes.to_vec();
-        nodes.sort_unstable_by(|a, b| b.cmp(a));
-        let mut left = MAX_CONTROLLED;
-        let mut is_controlled = |branch: Branch| {
-            let sources = match branch {
-                Branch::Emitters(node) => self.emitter_tree.emitters(node),
-                Branch::Lights(node) => match self.light_tree.children(node) {
-                    Err(light) if has_simple_light(&self.lights[light as usize]) => 1,
-                    _ => return false,
-                },
-            };
-            // The light of more emitters is approximated.
-            let is_cheap = sources <= EXACT_EMITTERS && sources <= left;
-            left -= if is_cheap { sources } else { 0 };
-            is_cheap
-        };
-        let branches =
-            nodes.into_iter().map(|node| node.branch).filter(|branch| is_controlled(*branch)).collect();
-        (branches, MAX_CONTROLLED - left)
+    /// The number of a branch's sources, if their unoccluded light is cheap to compute exactly at a point.
+    fn controllable_sources(&self, branch: Branch) -> Option<u32> {
+        match branch {
+            Branch::Emitters(node) => {
+                Some(self.emitter_tree.emitters(node)).filter(|emitters| *emitters <= EXACT_EMITTERS)
+            }
+            Branch::Lights(node) => {
+                let light = self.light_tree.children(node).err()?;
+                has_simple_light(&self.lights[light as usize]).then_some(1)
+            }
+        }
     }
 
     /// The nodes of all lamps, if those are to be sampled individually: if they are few, or fill most of what the

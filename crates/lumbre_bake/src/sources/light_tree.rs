@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use lumbre_optics::LightKind;
 
 use super::emitter_bounds::MIN_COSINE;
-use super::source_tree::{NodeKind, apparent_sine, clamp_below_one, split_at_median};
+use super::source_tree::{NodeKind, apparent_sine, clamp_below_one, distance_to_sphere, split_at_median};
 use crate::scene::{Canonical, PlacedLight, Receiver};
 
 /// The hierarchy of the point and spot lights.
@@ -88,7 +88,7 @@ impl LightTree {
     /// The distance from a receiver to a node's bounding sphere; 0 inside.
     pub fn distance(&self, index: u32, receiver: &Receiver) -> f32 {
         let node = &self.nodes[index as usize];
-        (node.center.distance(receiver.position) - node.radius).max(0.0)
+        distance_to_sphere(node.center, node.radius, receiver)
     }
 
     /// Samples a light of a node by `u` in [0, 1), about in proportion to the light that it brings to the receiver;

@@ -167,15 +167,13 @@ impl Sources<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use lumbre_mesh::shapes;
     use lumbre_optics::Light;
 
     use super::*;
     use crate::sampling::Stream;
-    use crate::scene::laid_out::laid_out;
-    use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, Side, StaticScene};
+    use crate::scene::laid_out::mesh_laid_out;
+    use crate::scene::{PlacedLight, Side};
     use crate::sources::Emitter;
     use crate::{BakeOptions, Density};
 
@@ -198,12 +196,8 @@ mod tests {
     /// shading normal that leans away from the facet. Only then is subtracting the one and adding the other no bias.
     #[test]
     fn the_mean_of_the_control_variate_is_the_exact_light() {
-        let floor =
-            PlacedPrimitive { mesh: Arc::new(shapes::plane(2.0, 2.0, 1, 1)), ..PlacedPrimitive::default() };
-        let objects = vec![SceneObject::new("floor", vec![floor])];
-        let input = StaticScene { objects, ..StaticScene::default() }.checked().unwrap();
         let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
-        let (_, scene) = laid_out(&input.objects, input.space(), &options);
+        let (_, scene) = mesh_laid_out(shapes::plane(2.0, 2.0, 1, 1), &options);
         let mut emitters: Vec<Emitter> = Vec::new();
         for lamp in 0..12u16 {
             let place = [f32::from(lamp % 4) * 0.5 - 1.0, f32::from(lamp / 4) * 0.5 - 0.7];

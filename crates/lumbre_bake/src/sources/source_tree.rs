@@ -35,6 +35,11 @@ pub(crate) fn apparent_sine(center: Vec3, radius: f32, receiver: &Receiver, reac
     if size < distance { size / distance } else { 1.0 }
 }
 
+/// The distance from a receiver to a sphere; 0 inside.
+pub(crate) fn distance_to_sphere(center: Vec3, radius: f32, receiver: &Receiver) -> f32 {
+    (center.distance(receiver.position) - radius).max(0.0)
+}
+
 /// Keeps in [0, 1) a random number that was rescaled to it, despite rounding.
 #[inline]
 pub(crate) fn clamp_below_one(u: f32) -> f32 {
