@@ -58,6 +58,11 @@ const STALLED: f64 = 0.9;
 /// So is a round that leaves less than this multiple of the goal: smoothing everything once more would cost more than
 /// the rest is worth.
 const ENOUGH: f64 = 1.15;
+/// A round that adds fewer samples per texel is not worth another smoothing, which takes as long as five of them: while
+/// it needs fewer, it aims at [`LOWER_AIM`] of the squared error, down to [`LEAST_AIM`] of the goal.
+const WORTHWHILE: f64 = 1.0;
+const LOWER_AIM: f64 = 0.8;
+const LEAST_AIM: f64 = 0.2;
 /// A control variate is to save so many times the samples that take as long as it does. More than one, as the rounds
 /// rarely take all the samples that the first one foresees.
 const WORTH_A_CONTROL: f32 = 2.0;
@@ -238,9 +243,18 @@ impl<'a> SharedLight<'a> {
                 }
             }
             before = sums;
-            let shares = errors.shares(goal, MAX_REDUCTION.recip());
-            let goal = WeightedGoal::new(&relative.cautious, &shares, &sampled, ORDER);
-            let allocated = self.allocator(&sampled, &goal.variances, &samples).within(budget, goal.sum);
+            let worthwhile = ((WORTHWHILE * count as f64) as u64 / REPLICATES as u64).min(budget);
+            let mut aim = goal;
+            let allocated = loop {
+                let shares = errors.shares(aim, MAX_REDUCTION.recip());
+                let weighted = WeightedGoal::new(&relative.cautious, &shares, &sampled, ORDER);
+                let allocator = self.allocator(&sampled, &weighted.variances, &samples);
+                let allocated = allocator.within(budget, weighted.sum);
+                if allocator.added(&allocated) >= worthwhile || aim < LEAST_AIM * goal {
+                    break allocated;
+                }
+                aim *= LOWER_AIM;
+            };
             monitor.pass(PASS);
             let mut sums = std::mem::take(&mut self.sums);
             let taken = take_samples(&allocated, &mut sums, monitor, |to, mut sums| {
