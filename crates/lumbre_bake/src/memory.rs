@@ -24,8 +24,8 @@ const TRIANGLE_BYTES: u64 =
 
 /// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
 /// round, raw and smoothed estimates with their features, its nearness, nineteen lists of one number each for the
-/// errors and what a round aims at, its chart, the light around it, and its block with its share of what is in view
-/// from there. (The sums of the shared samples of direct light need less, and are freed by then.)
+/// errors and what a round aims at, its chart, the light around it, its block with its share of what is in view from
+/// there, and a cell of steep light. (The sums of the shared samples of direct light need less, and are freed by then.)
 const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + size_of::<Direct>()
     + 2 * size_of::<GatherSums>()
@@ -33,7 +33,8 @@ const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + 24
     + size_of::<Nearness>()
     + 19 * 4
-    + 7 * 4) as u64;
+    + 7 * 4
+    + 2 * 12) as u64;
 
 /// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later:
 /// estimates with their bias, the numbers of the weighted fit, features with the noise, products, and nearness.

@@ -41,8 +41,8 @@ pub(crate) enum Stream {
     LocalLight,
     /// Shadow rays to sources that share samples, by replicate.
     SharedLight(u32),
-    /// Shadow rays at what rays of the final gather hit, by replicate.
-    SteepLight(u32),
+    /// Shadow rays of the cells of texels whose direct light is steep.
+    SteepLight,
     #[cfg(test)]
     Test(u32),
 }
@@ -66,7 +66,7 @@ impl Stream {
             Self::ChangedTexels => 61,
             Self::LocalLight => 80,
             Self::SharedLight(replicate) => 96 + replicate,
-            Self::SteepLight(replicate) => 112 + replicate,
+            Self::SteepLight => 112,
             #[cfg(test)]
             Self::Test(number) => number,
         }
@@ -283,9 +283,8 @@ mod tests {
             Stream::ChangedTexels => Stream::LocalLight,
             Stream::LocalLight => Stream::SharedLight(0),
             Stream::SharedLight(replicate @ 0..3) => Stream::SharedLight(replicate + 1),
-            Stream::SharedLight(_) => Stream::SteepLight(0),
-            Stream::SteepLight(replicate @ 0..3) => Stream::SteepLight(replicate + 1),
-            Stream::SteepLight(_) | Stream::Test(_) => return None,
+            Stream::SharedLight(_) => Stream::SteepLight,
+            Stream::SteepLight | Stream::Test(_) => return None,
         })
     }
 
@@ -305,7 +304,7 @@ mod tests {
         let streams = std::iter::successors(Some(Stream::FormFactors), |stream| after(*stream));
         let mut numbers: Vec<u32> = streams.map(Stream::number).collect();
         let count = numbers.len();
-        assert_eq!(count, 35);
+        assert_eq!(count, 32);
         numbers.sort_unstable();
         numbers.dedup();
         assert_eq!(numbers.len(), count);

@@ -18,7 +18,7 @@ use crate::coverage::{Texel, TileSequence, receiver};
 use crate::monitor::BakeMonitor;
 use crate::radiosity::PatchIndex;
 use crate::sample_allocation::{SampleAllocation, take_samples};
-use crate::sampling::{Sequence, Stream};
+use crate::sampling::Stream;
 use crate::scene::{Receiver, Side};
 
 /// One in this many samples also traces a real bounce, to check the patch that it reads.
@@ -137,10 +137,10 @@ impl RadianceCache<'_> {
                 wavefronts.samples.push(request, (replicate, sample));
             }
             if wavefronts.samples.count == WAVEFRONT {
-                self.gather_wavefront(texel, &sequences, seed, wavefronts, gathered);
+                self.gather_wavefront(texel, &sequences, wavefronts, gathered);
             }
         }
-        self.gather_wavefront(texel, &sequences, seed, wavefronts, gathered);
+        self.gather_wavefront(texel, &sequences, wavefronts, gathered);
         gathered.samples = first.max(samples);
     }
 
@@ -149,7 +149,6 @@ impl RadianceCache<'_> {
         &self,
         texel: &Texel,
         sequences: &[TileSequence; REPLICATES],
-        seed: u32,
         Wavefronts { samples, contributions, checks }: &mut Wavefronts,
         gathered: &mut GatherSums,
     ) {
@@ -168,12 +167,6 @@ impl RadianceCache<'_> {
                 gathered.sky_reads += u32::from(incident.light != Vec3::ZERO);
                 continue;
             };
-            if hit.is_steep {
-                let sequence = Sequence::new(seed, Stream::SteepLight(replicate as u32), texel.index.0);
-                let (direct, rays) = self.direct_light_at(hit.triangle, hit.at, sequence.of(sample));
-                hit.direct = direct;
-                contribution.rays += rays;
-            }
             let inverse_distance = incident.weight / hit.distance.max(f32::MIN_POSITIVE);
             let normal = self.scene.triangles[hit.triangle as usize].normal;
             gathered.nearness.add(Nearness::of_surface(inverse_distance, normal, &map_axes));

@@ -34,8 +34,6 @@ pub(crate) struct Hit {
     /// Irradiance there: direct, and by bounces as the texel or the patch has it.
     pub direct: Vec3,
     pub indirect: Vec3,
-    /// Whether `direct` changes so much over the texel that it does not hold for the point.
-    pub is_steep: bool,
     /// The patches' errors in `indirect`, each with its sign.
     pub error: Vec2,
     /// The squared error of `indirect` where it is that of a texel gathered in an earlier round; `None` where it is the
@@ -150,7 +148,8 @@ impl RadianceCache<'_> {
         for (path, result) in paths.iter().zip(results.iter_mut()) {
             let Some(hit) = &mut result.hit else { continue };
             let texel = self.texels.at(path.texel);
-            (hit.direct, hit.is_steep, hit.reflectance) = (texel.direct, texel.is_steep, texel.reflectance);
+            hit.direct = self.direct_at(texel, hit.triangle, hit.at).unwrap_or(Vec3::NAN);
+            hit.reflectance = texel.reflectance;
             if let Some(light) = texel.indirect() {
                 (hit.indirect, hit.error) = (light.irradiance, light.patch_error);
                 hit.variance = Some(light.variance);

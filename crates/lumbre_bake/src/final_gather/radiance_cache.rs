@@ -3,16 +3,15 @@
 
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
-use super::steep_light::steep_texels;
-use super::texel_radiance::{TexelRadiances, mean_reflectances};
-use crate::coverage::{CoveredTexels, FootprintPoint, receiver};
+use super::steep_light::SteepLight;
+use super::texel_radiance::{TexelRadiance, TexelRadiances, mean_reflectances};
+use crate::coverage::CoveredTexels;
 use crate::denoise::REPLICATES;
 use crate::direct_light::DirectLight;
 use crate::monitor::BakeMonitor;
 use crate::radiosity::{Discovery, Exchange, SamplingGuide};
-use crate::sampling::Sequence;
 use crate::scene::{BakeScene, LightmapLayout, Side};
 use crate::sources::Sources;
 use crate::texel_index::MapTexel;
@@ -27,6 +26,8 @@ pub(crate) struct RadianceCache<'a> {
     pub exchange: Exchange,
     /// The light and the reflectance of texels.
     pub texels: TexelRadiances,
+    /// Direct light within the texels over which it changes much.
+    pub steep: SteepLight,
     /// Radius on a surface within which the errors that rounds leave in texels are correlated, canonical units.
     pub correlation_radius: f32,
     /// Which regions the light of each region comes from: as the patches know it, and with all `discoveries`.
@@ -41,8 +42,8 @@ pub(crate) struct RadianceCache<'a> {
 /// of the demo level, 5.4 after the second.
 const CORRELATED_TEXELS: f32 = 4.5;
 
-/// Shadow rays to each lamp from a point whose texel's direct light is steep.
-const STEEP_LIGHT_SAMPLES: u32 = 1;
+/// Share of the stage's progress that the light of steep texels makes up.
+const STEEP_PROGRESS: f32 = 0.05;
 
 impl<'a> RadianceCache<'a> {
     /// The cache before the first round: direct light of texels, light by bounces of patches.
@@ -56,15 +57,17 @@ impl<'a> RadianceCache<'a> {
     ) -> Result<Self, BakeError> {
         let (scene, effort) = (sources.scene, options.effort());
         let mut direct_by_place = direct.by_place(texels);
-        let steep = steep_texels(texels, &direct_by_place, &direct.local);
         // Its one value, a mean of both sides of the wall, would be wrong on either.
         for texel in &texels.divided {
             direct_by_place[texels.list[texel.place()].index.place()] = Vec3::NAN;
         }
+        monitor.pass(STEEP_PROGRESS);
+        let (steep, steep_texels) = SteepLight::new(sources, texels, direct, options.seed, monitor)?;
         let reflectance = monitor.run_interruptible(0.0, || mean_reflectances(texels, &exchange.patches))?;
         Ok(Self {
             correlation_radius: CORRELATED_TEXELS * texels.side,
-            texels: TexelRadiances::new(&direct_by_place, &steep, &reflectance),
+            texels: TexelRadiances::new(&direct_by_place, &steep_texels, &reflectance),
+            steep,
             scene,
             sources,
             layout: texels.layout,
@@ -84,18 +87,21 @@ impl RadianceCache<'_> {
         let texel = self.texels.at(self.texel_at(triangle, side, at));
         let gathered = texel.indirect().map(|light| light.irradiance);
         let indirect = gathered.unwrap_or_else(|| self.exchange.indirect[patch.place()]);
-        let direct = texel.direct().unwrap_or_else(|| self.exchange.direct[patch.place()]);
+        let direct = self.direct_at(texel, triangle, at);
+        let direct = direct.unwrap_or_else(|| self.exchange.direct[patch.place()]);
         let irradiance = direct + indirect;
         self.reflectance_at(triangle, side, at) * irradiance
     }
 
-    /// The direct irradiance (mixed lights included) at a point of a front, W/m², and the rays that it took: where that
-    /// of the texel is steep.
-    pub(crate) fn direct_light_at(&self, triangle: u32, at: (f32, f32), sequence: Sequence) -> (Vec3, u32) {
-        let point = FootprintPoint { triangle, at, offset: Vec2::ZERO };
-        let receiver = receiver(self.scene, &point);
-        let direct = self.sources.irradiance(sequence, STEEP_LIGHT_SAMPLES, &|_, _| Some(receiver));
-        (direct.total(), direct.rays)
+    /// The direct irradiance (mixed lights included) at a point of the triangle that a texel shows, W/m², if the texel
+    /// knows it.
+    #[inline]
+    pub(crate) fn direct_at(&self, texel: &TexelRadiance, triangle: u32, at: (f32, f32)) -> Option<Vec3> {
+        let at_point = texel.steep.and_then(|steep| {
+            let place = self.scene.triangles[triangle as usize].place_on_map(at);
+            self.steep.at(steep, place - place.floor())
+        });
+        at_point.or_else(|| texel.direct())
     }
 
     /// The reflectance at a point of a surface.

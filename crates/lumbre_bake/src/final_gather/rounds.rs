@@ -165,7 +165,7 @@ pub(crate) fn gather(
     let cast: u64 = cast.map(|sums| u64::from(sums.samples) * REPLICATES as u64).sum();
     let gather_rays = cast as f64 / planner.count();
     let leaked_rays = cache.scene.leaks.count() - leaked_before;
-    let rays = gathered.iter().map(|sums| sums.rays).sum::<u64>();
+    let rays = cache.steep.rays + gathered.iter().map(|sums| sums.rays).sum::<u64>();
     let report = GatherReport { error, curve, ended, leaked_rays, gather_rays };
     Ok(((IndirectLight { light, variances, gathered }, report), StageNotes::of_rays(rays)))
 }

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::gather_sums::GatherSums;
+use super::steep_light::{SteepLight, SteepTexel};
 use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel};
 use crate::radiosity::Patches;
 use crate::scene::Side;
@@ -19,8 +20,8 @@ pub(crate) struct TexelRadiances(Vec<TexelRadiance>);
 pub(crate) struct TexelRadiance {
     /// Direct irradiance, W/m² (mixed lights included); NaN where the texel shows nothing, and where a wall divides it.
     pub direct: Vec3,
-    /// Whether direct light changes so much over the texel that `direct` does not hold for a point.
-    pub is_steep: bool,
+    /// Of a texel over which direct light changes so much that `direct` does not hold for a point.
+    pub steep: Option<SteepTexel>,
     /// Mean reflectance where it varies over the triangle; NaN elsewhere.
     pub reflectance: Vec3,
     /// The light by bounces that an earlier round of the gather has found; its irradiance is NaN where it is not known,
@@ -44,7 +45,7 @@ impl TexelRadiance {
     /// Of a texel of which nothing is known.
     pub const UNKNOWN: Self = Self {
         direct: Vec3::NAN,
-        is_steep: false,
+        steep: None,
         reflectance: Vec3::NAN,
         indirect: TexelLight { irradiance: Vec3::NAN, variance: 0.0, patch_error: Vec2::ZERO },
     };
@@ -62,14 +63,18 @@ impl TexelRadiance {
 }
 
 impl TexelRadiances {
-    /// Before the first round of the gather. All lists are per texel of all maps, and NaN where nothing is known;
-    /// `reflectance` may be empty.
-    pub fn new(direct: &[Vec3], steep: &[bool], reflectance: &[Vec3]) -> Self {
-        let texel = |(place, (&direct, &is_steep)): (usize, (&Vec3, &bool))| {
+    /// Before the first round of the gather. `direct` and `reflectance` are per texel of all maps, and NaN where nothing
+    /// is known; `reflectance` may be empty. `steep` are the texels of [`SteepLight`].
+    pub fn new(direct: &[Vec3], steep: &[MapTexel], reflectance: &[Vec3]) -> Self {
+        let texel = |(place, &direct): (usize, &Vec3)| {
             let reflectance = reflectance.get(place).copied().unwrap_or(Vec3::NAN);
-            TexelRadiance { direct, is_steep, reflectance, ..TexelRadiance::UNKNOWN }
+            TexelRadiance { direct, reflectance, ..TexelRadiance::UNKNOWN }
         };
-        Self(direct.iter().zip(steep).enumerate().map(texel).collect())
+        let mut texels: Vec<TexelRadiance> = direct.iter().enumerate().map(texel).collect();
+        for (texel, number) in steep.iter().zip(SteepLight::numbers()) {
+            texels[texel.place()].steep = Some(number);
+        }
+        Self(texels)
     }
 
     /// Sets the light by bounces that a round of the gather has found. All lists are per covered texel.
