@@ -270,6 +270,14 @@ impl Texel {
         (2.0 * triangle.area / (b - a).perp_dot(c - a).abs()).sqrt()
     }
 
+    /// Its side, canonical units, if all of it lies on one flat triangle.
+    pub fn flat_side(&self, scene: &BakeScene) -> Option<f32> {
+        match self.footprint {
+            Footprint::Whole(triangle) if scene.triangles[triangle as usize].flat => Some(self.side(scene)),
+            _ => None,
+        }
+    }
+
     /// How the map lies on the texel's surface.
     pub fn map_axes(&self, scene: &BakeScene) -> MapAxes {
         let triangle = &scene.triangles[self.triangle as usize];

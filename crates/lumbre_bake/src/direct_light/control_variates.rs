@@ -42,14 +42,14 @@ const NEAR: f32 = 4.0;
 impl<'a> TexelPoints<'a> {
     fn of(sources: &Sources<'_>, shared: &SharedSources, texel: &'a Texel) -> Self {
         let scene = sources.scene;
-        let triangle = match &texel.footprint {
+        match &texel.footprint {
             Footprint::Points(points) => return Self::All(points),
             Footprint::Hidden => return Self::All(&[]),
-            Footprint::Whole(triangle) => &scene.triangles[*triangle as usize],
-        };
-        let middle = texel.point(scene, 0.5, 0.5).filter(|_| triangle.flat);
-        let sides_away = middle.map_or(0.0, |middle| {
-            sources.nearest_controlled(shared, &receiver(scene, &middle)) / texel.side(scene)
+            Footprint::Whole(_) => {}
+        }
+        let middle = texel.point(scene, 0.5, 0.5).zip(texel.flat_side(scene));
+        let sides_away = middle.map_or(0.0, |(middle, side)| {
+            sources.nearest_controlled(shared, &receiver(scene, &middle)) / side
         });
         match sides_away {
             _ if sides_away > FAR => Self::Middle,

@@ -99,6 +99,7 @@ impl<'a> SourceSampler<'a> {
             point: |x: f32, y: f32| texel.point(scene, x, y).map(|point| receiver(scene, &point)),
             covered: if texel.has_points_for_all() { Some(&anywhere) } else { None },
             is_point: false,
+            flat_side: texel.flat_side(scene),
             visibility: &self.shafts.visibility(covered.place(), texel),
             sequence: Sequence::new(self.options.seed, Stream::DirectLight, texel.index.0),
             samples,

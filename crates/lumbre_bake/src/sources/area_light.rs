@@ -29,6 +29,10 @@ struct VisibleFraction {
 /// Factor by which the number of samples grows if none of them could bring light although the source does.
 const RETRY_FACTOR: u32 = 16;
 
+/// Distance of a flat texel from a lamp, in sides of the texel, from which on its middle stands for all of it: of the light
+/// of a small lamp right opposite, that makes an error of h²/(3d²) = 0.03 %.
+const FAR: f32 = 32.0;
+
 /// Shadow rays that cost about as much as computing a source's visible part exactly at one point.
 const RAYS_PER_EXACT_POINT: u32 = 8;
 
@@ -61,13 +65,7 @@ impl Sources<'_> {
         for (place, (&node, weight)) in nodes.iter().zip(weights).enumerate() {
             let samples = samples_for(sampled.samples, weight / brightest);
             let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
-            let unoccluded = || match sampled.is_point {
-                true => (self.emitter_tree.unoccluded(&self.emitters, node, &anchor), 0.0),
-                false => ReceiverQuadrature::mean(|x, y| {
-                    let receiver = (sampled.point)(x, y)?;
-                    Some(self.emitter_tree.unoccluded(&self.emitters, node, &receiver))
-                }),
-            };
+            let unoccluded = || self.mean_unoccluded(node, &anchor, sampled);
             let occluders = sampled.visibility.lamps.iter().find(|occluders| occluders.node == node);
             let known = occluders.and_then(|occluders| match occluders.emitters.is_empty() {
                 true => Some(unoccluded()),
@@ -96,6 +94,26 @@ impl Sources<'_> {
             direct.variance += (term_error * channel_mean(light * fraction.mean)).powi(2);
         }
         irradiance
+    }
+
+    /// The mean light of a lamp over a receiver, without occluders, and the squared error of that mean. `anchor` is the
+    /// receiver's middle.
+    fn mean_unoccluded(
+        &self,
+        node: u32,
+        anchor: &Receiver,
+        sampled: &SampledReceiver<'_, impl SurfacePoints>,
+    ) -> (Vec3, f32) {
+        let at = |receiver: &Receiver| self.emitter_tree.unoccluded(&self.emitters, node, receiver);
+        let sides_away = sampled.flat_side.map(|side| self.emitter_tree.distance(node, anchor) / side);
+        match sides_away.filter(|sides_away| *sides_away > FAR) {
+            _ if sampled.is_point => (at(anchor), 0.0),
+            Some(sides_away) => {
+                let light = at(anchor);
+                (light, (channel_mean(light) / (3.0 * sides_away * sides_away)).powi(2))
+            }
+            None => ReceiverQuadrature::mean(|x, y| (sampled.point)(x, y).map(|receiver| at(&receiver))),
+        }
     }
 
     /// The mean light of a lamp whose possible occluders are known, and its variance, computed exactly at as many

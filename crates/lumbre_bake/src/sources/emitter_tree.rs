@@ -6,7 +6,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{DVec3, Mat3, Vec3};
+use glam::{DMat3, DVec3, Mat3, Vec3};
 
 use super::emitter_bounds::EmitterBounds;
 use super::emitter_walk::{EmitterChoice, EmitterWalk};
@@ -35,6 +35,8 @@ struct Node {
     area: f32,
     /// Σ radiance · area · normal: a column for each channel.
     moments: Mat3,
+    /// Where all emitters face the same way, the moments of their position about its centre.
+    flat: Option<FlatMoments>,
     /// Number of lamps that it contains, wholly or in part.
     lamps: u32,
     /// Index of its first emitter in [`EmitterTree::order`].
@@ -44,12 +46,40 @@ struct Node {
     kind: NodeKind,
 }
 
+/// The first and second moments of the position of emitters that face the same way, about the centre of their power.
+#[derive(Clone, Copy, Debug)]
+struct FlatMoments {
+    /// How far their corners are in front of the plane through the centre, at least and at most; negative behind it.
+    offsets: [f32; 2],
+    /// Σ radiance · area · position: a column for each channel. Their sum is 0.
+    first: Mat3,
+    /// Σ power · position · positionᵀ / Σ power.
+    second: Mat3,
+}
+
+/// How much of emitters that face the same way a receiver may see: it and they are above each other's horizons.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum FlatView {
+    None,
+    Part,
+    Whole,
+}
+
 /// Nodes of up to this many emitters are summed exactly, emitter by emitter, at any distance.
 pub(crate) const EXACT_EMITTERS: u32 = 48;
 /// In larger nodes, descendants whose radius is less than this fraction of their distance are approximated by one term.
 /// For a node of radius r at distance d, the relative error is about (r/d)², here a quarter of a per cent, plus (r/d)
 /// times the difference of its normals.
 const OPENING: f32 = 0.05;
+/// The same for nodes whose emitters all face the same way: their light is expanded to the second order about their
+/// centre, so that the relative error is of the order of (r/d)³.
+const FLAT_OPENING: f32 = 0.15;
+/// Emitters face the same way if their normals differ from the mean by no more than this.
+const FLAT: f32 = 1e-4;
+/// Emitters in one plane bring nothing to a receiver that faces the same way, to this difference from 1 of the cosine
+/// between their normals. In one plane are those whose offsets from it are at most this share of their radius.
+const PARALLEL: f32 = 1e-7;
+const IN_A_PLANE: f32 = 1e-4;
 /// A node that may partly face away is not opened further if it can bring no more than this fraction of the light
 /// summed so far.
 const NEGLIGIBLE: f32 = 0.003;
@@ -59,6 +89,8 @@ pub(crate) const TERM_ERROR: f32 = 0.005;
 
 /// Lamps whose common bounding sphere appears under at most this sine are treated as casting one shadow.
 const NARROW: f32 = 0.02;
+/// Nodes whose radius is more than this share of their distance are divided to find that of their emitters.
+const DIVIDED: f32 = 0.25;
 /// Most nodes that [`EmitterTree::form_factor`] opens.
 const MAX_OPENED: usize = 64;
 
@@ -164,10 +196,29 @@ impl EmitterTree {
         apparent_sine(bounds.center, bounds.radius, receiver, reach)
     }
 
-    /// The distance from a receiver to a node's bounding sphere; 0 inside.
+    /// A lower bound of the distance from a receiver to a node's emitters: that to the nearest of the spheres around parts
+    /// of the node which are small beside their distance.
     pub fn distance(&self, index: u32, receiver: &Receiver) -> f32 {
-        let bounds = &self.bounds[index as usize];
-        distance_to_sphere(bounds.center, bounds.radius, receiver)
+        let to_sphere = |index: u32| {
+            let bounds = &self.bounds[index as usize];
+            distance_to_sphere(bounds.center, bounds.radius, receiver)
+        };
+        let (mut nearest, mut open) = (f32::INFINITY, vec![(to_sphere(index), index)]);
+        while let Some((distance, index)) = open.pop() {
+            if distance >= nearest {
+                continue;
+            }
+            let is_large = self.bounds[index as usize].radius > DIVIDED * distance;
+            match self.children(index).filter(|_| is_large) {
+                None => nearest = distance,
+                Some(children) => {
+                    let [near, far] = children.map(|child| (to_sphere(child), child));
+                    let (near, far) = if near.0 <= far.0 { (near, far) } else { (far, near) };
+                    open.extend([far, near]);
+                }
+            }
+        }
+        nearest
     }
 
     /// Estimates the unoccluded form factor from a receiver to all emitters together, from 0 to about 1. A distant node
@@ -237,6 +288,23 @@ impl EmitterTree {
         open.push(index);
         while let Some(index) = open.pop() {
             let (node, bounds) = (&self.nodes[index as usize], &self.bounds[index as usize]);
+            let towards = bounds.center - receiver.position;
+            let height = towards.dot(receiver.normal);
+            if height <= -bounds.radius {
+                continue;
+            }
+            let distance = towards.length();
+            if let Some(flat) = &node.flat {
+                match flat.view(bounds, towards, receiver.normal) {
+                    FlatView::None => continue,
+                    FlatView::Whole if bounds.radius < FLAT_OPENING * distance => {
+                        let light = flat.light_at(node.light, bounds.axis, towards, receiver.normal);
+                        sum += light.as_dvec3();
+                        continue;
+                    }
+                    _ => {}
+                }
+            }
             let children = match node.kind {
                 NodeKind::Leaf(emitter) => {
                     sum += light_of(emitter);
@@ -244,12 +312,6 @@ impl EmitterTree {
                 }
                 NodeKind::Inner(children) => children,
             };
-            let towards = bounds.center - receiver.position;
-            let height = towards.dot(receiver.normal);
-            if height <= -bounds.radius {
-                continue;
-            }
-            let distance = towards.length();
             if bounds.radius < OPENING * distance && height > bounds.radius {
                 let direction = towards / distance;
                 let (faces, may_differ) =
@@ -296,6 +358,77 @@ impl EmitterTree {
     }
 }
 
+impl FlatMoments {
+    /// `None` if the emitters face different ways.
+    fn new<'a>(emitters: impl Iterator<Item = &'a Emitter>, bounds: &EmitterBounds) -> Option<Self> {
+        if bounds.spread > FLAT {
+            return None;
+        }
+        let (mut first, mut second, mut power) = (DMat3::ZERO, DMat3::ZERO, 0.0);
+        let mut offsets = [f32::INFINITY, f32::NEG_INFINITY];
+        for emitter in emitters {
+            let light = emitter.radiance.as_dvec3() * f64::from(emitter.area);
+            let corners = emitter.corners_f64.map(|corner| corner - bounds.center.as_dvec3());
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+            first += outer_product(middle, light);
+            for corner in corners {
+                let offset = corner.dot(bounds.axis.as_dvec3()) as f32;
+                offsets = [offsets[0].min(offset), offsets[1].max(offset)];
+            }
+            // Over a triangle the mean of ppᵀ is that of its middle and, about that, a twelfth of the corners' sum.
+            let about_middle = corners.map(|corner| outer_product(corner - middle, corner - middle));
+            let of_triangle = outer_product(middle, middle)
+                + (about_middle[0] + about_middle[1] + about_middle[2]) * (1.0 / 12.0);
+            second += of_triangle * light.element_sum();
+            power += light.element_sum();
+        }
+        let second = second * (1.0 / power);
+        second.is_finite().then(|| Self { offsets, first: first.as_mat3(), second: second.as_mat3() })
+    }
+
+    /// What a receiver of which the centre is `towards` away may see.
+    fn view(&self, bounds: &EmitterBounds, towards: Vec3, normal: Vec3) -> FlatView {
+        let [behind, front] = self.offsets;
+        let cosine = normal.dot(bounds.axis);
+        let is_parallel = cosine >= 1.0 - PARALLEL && front - behind <= IN_A_PLANE * bounds.radius;
+        // How far the emitters are above the receiver's horizon, and it above theirs.
+        let (height, above) = (towards.dot(normal), -towards.dot(bounds.axis));
+        let in_plane = (normal - cosine * bounds.axis).length() * bounds.radius;
+        let (lower, higher) = ((cosine * behind).min(cosine * front), (cosine * behind).max(cosine * front));
+        if is_parallel || height + higher + in_plane <= 0.0 || above - behind <= 0.0 {
+            FlatView::None
+        } else if height + lower - in_plane > 0.0 && above - front > 0.0 {
+            FlatView::Whole
+        } else {
+            FlatView::Part
+        }
+    }
+
+    /// The irradiance that emitters of normal `axis` and of so much light (Σ radiance · area) bring to a receiver of
+    /// which the centre is `towards` away, with all of them above its horizon and it above theirs: the kernel
+    /// f(t) = (n·t)(-a·t) / |t|⁴ to the second order, f light + first moment ∇f + light (second moment : ∇∇f) / 2.
+    fn light_at(&self, light: Vec3, axis: Vec3, towards: Vec3, normal: Vec3) -> Vec3 {
+        let inverse = towards.length_squared().recip();
+        let (height, above) = (towards.dot(normal), -towards.dot(axis));
+        let value = height * above * inverse * inverse;
+        // ∇((n·t)(-a·t))
+        let slope = above * normal - height * axis;
+        let gradient = slope * (inverse * inverse) - towards * (4.0 * value * inverse);
+        let [across, along] = [axis, towards].map(|vector| self.second * vector);
+        let trace = self.second.x_axis.x + self.second.y_axis.y + self.second.z_axis.z;
+        let curvature = -2.0 * normal.dot(across) * inverse * inverse
+            - 8.0 * slope.dot(along) * inverse * inverse * inverse
+            - 4.0 * value * inverse * trace
+            + 24.0 * value * inverse * inverse * towards.dot(along);
+        light * (value + 0.5 * curvature) + self.first.transpose() * gradient
+    }
+}
+
+/// a bᵀ
+fn outer_product(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
 /// A node over `members`, without children, and its bounds.
 fn summarize(emitters: &[Emitter], members: &[u32], lamps: u32, first: u32) -> (Node, EmitterBounds) {
     let emitter_at = |&index: &u32| &emitters[index as usize];
@@ -326,7 +459,8 @@ fn summarize(emitters: &[Emitter], members: &[u32], lamps: u32, first: u32) -> (
     let moments = Mat3::from_cols(red, green, blue);
     let (light, power, area) = (sum.as_vec3(), power as f32, area as f32);
     let bounds = EmitterBounds { center, radius, axis, spread, power };
-    (Node { light, area, moments, lamps, first, emitters, kind }, bounds)
+    let flat = FlatMoments::new(members.iter().map(emitter_at), &bounds);
+    (Node { light, area, moments, flat, lamps, first, emitters, kind }, bounds)
 }
 
 /// Mean of the emitters' centroids.

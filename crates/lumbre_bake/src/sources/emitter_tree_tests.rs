@@ -74,6 +74,33 @@ fn approximating_distant_nodes_by_one_term_is_close_to_the_exact_sum() {
     assert!(worst < 0.03 && squares.sqrt() < f64::from(TERM_ERROR), "{worst} {squares}");
 }
 
+/// A screen of 48 x 24 squares of random colours that faces down, wholly above the horizon of receivers or not.
+#[test]
+fn distant_parts_of_a_flat_lamp_are_close_to_the_exact_sum() {
+    let color = |i: i32| {
+        let [x, y, z, _] = Sequence::new(9, Stream::Test(0), 0).point(i as u32, 0);
+        Vec3::new(x, y, z * z * z).powf(3.0)
+    };
+    let place = |i: i32| Vec3::new((i % 48) as f32 / 24.0 - 1.0, 1.0, (i / 48) as f32 / 24.0 - 0.5);
+    let emitters: Vec<Emitter> = (0..48 * 24)
+        .flat_map(|i| square(place(i), 1.0 / 24.0).map(|half| Emitter { radiance: color(i), ..half }))
+        .collect();
+    let tree = EmitterTree::new(&emitters, &vec![0; emitters.len()]);
+    let (mut worst, mut squares) = (0.0f64, 0.0);
+    for i in 0..400 {
+        let [x, y, z, w] = Sequence::new(3, Stream::Test(0), 0).point(i, 0);
+        let position = Vec3::new(4.0 * x - 2.0, 0.98 * y, 4.0 * z - 2.0);
+        let normal = if w < 0.5 { Vec3::Y } else { Vec3::new(0.6, 0.0, -0.8) };
+        let at = receiver(position, normal);
+        let (computed, expected) = (tree.unoccluded(&emitters, 0, &at).as_dvec3(), exact(&emitters, &at));
+        let scale = expected.element_sum().max(1e-4);
+        let error = (computed - expected).abs().element_sum() / scale;
+        (worst, squares) = (worst.max(error), squares + error * error / 400.0);
+    }
+    println!("worst of 400: {:.4} %, RMS {:.4} %", 100.0 * worst, 100.0 * squares.sqrt());
+    assert!(worst < 0.01 && squares.sqrt() < 0.3 * f64::from(TERM_ERROR), "{worst} {squares}");
+}
+
 #[test]
 fn a_node_holds_the_emitters_of_its_children() {
     let (emitters, lamps) = scene();

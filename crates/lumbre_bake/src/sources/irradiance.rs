@@ -23,7 +23,15 @@ impl Sources<'_> {
         let cut = self.cut(&anchor, reach, &[]);
         let is_point = reach == 0.0;
         let visibility = &Visibility::UNKNOWN;
-        let receiver = SampledReceiver { point, covered: None, is_point, visibility, sequence, samples };
+        let receiver = SampledReceiver {
+            point,
+            covered: None,
+            is_point,
+            flat_side: None,
+            visibility,
+            sequence,
+            samples,
+        };
         let mut direct = self.irradiance_per_source(&cut, &receiver);
         self.add_shared_light(&cut.shared, sequence, SHARED_SAMPLES_FACTOR * samples, point, &mut direct);
         direct
