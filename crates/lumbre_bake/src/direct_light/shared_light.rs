@@ -58,8 +58,10 @@ const STALLED: f64 = 0.9;
 /// So is a round that leaves less than this multiple of the goal: smoothing everything once more would cost more than
 /// the rest is worth.
 const ENOUGH: f64 = 1.15;
-/// A round that adds fewer samples per texel is not worth another smoothing, which takes as long as five of them: while
-/// it needs fewer, it aims at [`LOWER_AIM`] of the squared error, down to [`LEAST_AIM`] of the goal.
+/// The number of samples per texel that take about as long as smoothing all texels once.
+const SMOOTHING: f64 = 5.0;
+/// A round that adds fewer samples per texel is not worth another smoothing: while it needs fewer, it aims at
+/// [`LOWER_AIM`] of the squared error, down to [`LEAST_AIM`] of the goal.
 const WORTHWHILE: f64 = 1.0;
 const LOWER_AIM: f64 = 0.8;
 const LEAST_AIM: f64 = 0.2;
@@ -279,14 +281,15 @@ impl<'a> SharedLight<'a> {
         SampleAllocator { texels, variances, samples, most: self.most, order: ORDER }
     }
 
-    /// Whether a texel is to have so many samples more that its control variate, which would leave a share of the
-    /// variance, saves more of them than it takes.
-    fn is_worth_a_control(&self, to: SampleAllocation, variance_left: f32) -> bool {
+    /// How many of the samples that a texel is to have its control variate saves, which would leave a share of the
+    /// variance; `None` if that is too little for what it takes.
+    fn saved_by_a_control(&self, to: SampleAllocation, variance_left: f32) -> Option<f32> {
         let more = to.samples.saturating_sub(self.sums[to.texel.place()].samples) * REPLICATES as u32;
+        let saved = more as f32 * (1.0 - variance_left);
         // Near the sources it takes up to twenty times as long, but there is more to save, too: the noise of some texels
         // would take far more samples than one round foresees.
         let cost = self.cuts.of(to.texel).shared.control_cost();
-        more as f32 * (1.0 - variance_left) > WORTH_A_CONTROL * cost as f32
+        (saved > WORTH_A_CONTROL * cost as f32).then_some(saved)
     }
 
     /// Computes the control variates of texels that are to have so many samples, where they are worth it and as far as
@@ -296,16 +299,19 @@ impl<'a> SharedLight<'a> {
         planned: &[SampleAllocation],
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<bool, BakeError> {
-        let texels: Vec<CoveredTexel> = monitor.run_interruptible(1.0, || {
+        let (texels, saved): (Vec<CoveredTexel>, Vec<f32>) = monitor.run_interruptible(1.0, || {
             let left_of_blocks = variance_left(&self.neighbourhoods, &self.sums, &self.cuts.blocks);
-            let worth_it = |to: &&SampleAllocation| {
+            let worth_it = |to: &SampleAllocation| {
                 let left = left_of_blocks[self.cuts.block(to.texel) as usize];
                 let is_new = self.sums[to.texel.place()].controlled_light.is_none();
-                is_new && self.is_worth_a_control(**to, left)
+                let saved = self.saved_by_a_control(*to, left).filter(|_| is_new);
+                saved.map(|saved| (to.texel, saved))
             };
-            planned.par_iter().filter(worth_it).map(|to| to.texel).collect()
+            planned.par_iter().filter_map(worth_it).unzip()
         })?;
-        if texels.is_empty() {
+        // Everything is smoothed once more.
+        let saved = saved.iter().map(|saved| f64::from(*saved)).sum::<f64>();
+        if saved < SMOOTHING * self.texels.len() as f64 {
             return Ok(false);
         }
         monitor.pass(PASS);
