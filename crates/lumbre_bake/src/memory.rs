@@ -34,7 +34,7 @@ const COVERED_TEXEL_BYTES: u64 = (size_of::<Texel>()
     + size_of::<Nearness>()
     + 19 * 4
     + 7 * 4
-    + 2 * 12) as u64;
+    + 12) as u64;
 
 /// Per texel of a map. In the rows of the smoothing, which need more than the maps of light that are filled later:
 /// estimates with their bias, the numbers of the weighted fit, features with the noise, products, and nearness.

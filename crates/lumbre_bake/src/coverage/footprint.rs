@@ -270,10 +270,13 @@ impl Texel {
         (2.0 * triangle.area / (b - a).perp_dot(c - a).abs()).sqrt()
     }
 
-    /// Its side, canonical units, if all of it lies on one flat triangle.
+    /// Its longer side, canonical units, if all of it lies on one flat triangle.
     pub fn flat_side(&self, scene: &BakeScene) -> Option<f32> {
         match self.footprint {
-            Footprint::Whole(triangle) if scene.triangles[triangle as usize].flat => Some(self.side(scene)),
+            Footprint::Whole(triangle) if scene.triangles[triangle as usize].flat => {
+                let axes = self.map_axes(scene);
+                Some(axes.column_step.length().max(axes.row_step.length()))
+            }
             _ => None,
         }
     }

@@ -245,7 +245,8 @@ impl<'a> SharedLight<'a> {
                 }
             }
             before = sums;
-            let worthwhile = ((WORTHWHILE * count as f64) as u64 / REPLICATES as u64).min(budget);
+            let worthwhile = (WORTHWHILE * self.texels.len() as f64) as u64 / REPLICATES as u64;
+            let worthwhile = worthwhile.min(budget);
             let mut aim = goal;
             let allocated = loop {
                 let shares = errors.shares(aim, MAX_REDUCTION.recip());
@@ -281,15 +282,15 @@ impl<'a> SharedLight<'a> {
         SampleAllocator { texels, variances, samples, most: self.most, order: ORDER }
     }
 
-    /// How many of the samples that a texel is to have its control variate saves, which would leave a share of the
-    /// variance; `None` if that is too little for what it takes.
+    /// How many of the samples that a texel is to have its control variate saves, beside those that would take as long as
+    /// it does; it would leave a share of the variance. `None` if that is too little for what it takes.
     fn saved_by_a_control(&self, to: SampleAllocation, variance_left: f32) -> Option<f32> {
         let more = to.samples.saturating_sub(self.sums[to.texel.place()].samples) * REPLICATES as u32;
         let saved = more as f32 * (1.0 - variance_left);
         // Near the sources it takes up to twenty times as long, but there is more to save, too: the noise of some texels
         // would take far more samples than one round foresees.
         let cost = self.cuts.of(to.texel).shared.control_cost();
-        (saved > WORTH_A_CONTROL * cost as f32).then_some(saved)
+        (saved > WORTH_A_CONTROL * cost as f32).then_some(saved - cost as f32)
     }
 
     /// Computes the control variates of texels that are to have so many samples, where they are worth it and as far as

@@ -57,12 +57,13 @@ impl<'a> RadianceCache<'a> {
     ) -> Result<Self, BakeError> {
         let (scene, effort) = (sources.scene, options.effort());
         let mut direct_by_place = direct.by_place(texels);
+        monitor.pass(STEEP_PROGRESS);
+        let (steep, steep_texels) =
+            SteepLight::new(sources, texels, direct, &direct_by_place, options.seed, monitor)?;
         // Its one value, a mean of both sides of the wall, would be wrong on either.
         for texel in &texels.divided {
             direct_by_place[texels.list[texel.place()].index.place()] = Vec3::NAN;
         }
-        monitor.pass(STEEP_PROGRESS);
-        let (steep, steep_texels) = SteepLight::new(sources, texels, direct, options.seed, monitor)?;
         let reflectance = monitor.run_interruptible(0.0, || mean_reflectances(texels, &exchange.patches))?;
         Ok(Self {
             correlation_radius: CORRELATED_TEXELS * texels.side,
@@ -99,7 +100,7 @@ impl RadianceCache<'_> {
     pub(crate) fn direct_at(&self, texel: &TexelRadiance, triangle: u32, at: (f32, f32)) -> Option<Vec3> {
         let at_point = texel.steep.and_then(|steep| {
             let place = self.scene.triangles[triangle as usize].place_on_map(at);
-            self.steep.at(steep, place - place.floor())
+            self.steep.at(steep, place - place.trunc())
         });
         at_point.or_else(|| texel.direct())
     }

@@ -50,7 +50,8 @@ const WITH_DIRECT_LIGHT: f64 = 2.15;
 /// more than such a share of the rays that are left.
 const BUDGET_FOR_ALL: f64 = 0.2;
 /// A round that adds a smaller fraction of the rays cast, or fewer per texel than [`WORTHWHILE_PER_TEXEL`], is not worth
-/// another smoothing either, which takes as long as three or four rays per texel: while a round needs fewer, it aims at [`LOWER_TARGET`] of the squared error, down to [`LEAST_TARGET`] of what was requested.
+/// another smoothing either, which takes as long as three or four rays per texel: while a round needs fewer, it aims at
+/// [`LOWER_TARGET`] of the squared error, down to [`LEAST_TARGET`] of what was requested.
 const WORTHWHILE: f64 = 0.02;
 const WORTHWHILE_PER_TEXEL: f64 = 1.0;
 const LOWER_TARGET: f64 = 0.8;
@@ -360,7 +361,7 @@ impl<'a> RoundPlanner<'a> {
         let missed = if is_whole_reached { error.in_worst_view } else { error.relative };
         let requested_over_left = requested / missed.powi(2).max(f64::MIN_POSITIVE);
         let per_texel = WORTHWHILE_PER_TEXEL * self.count() / REPLICATES as f64;
-        let worthwhile = (WORTHWHILE * cast as f64).max(per_texel) as u64;
+        let worthwhile = ((WORTHWHILE * cast as f64).max(per_texel) as u64).min(affordable);
         let for_small_step = limit.max(times(of_quality, SMALL_STEP_RAYS)).saturating_sub(counted);
         let is_small_step = is_spent && requested_over_left > SMALL_STEP && for_small_step >= worthwhile;
         let (first_target, budget) = match is_small_step {
@@ -374,19 +375,18 @@ impl<'a> RoundPlanner<'a> {
             let wanted = allocator.within(most, goal.sum);
             (allocator.added(&wanted), wanted)
         };
+        // The mean over the level comes first where the rays may not suffice for every room.
+        let aims_at_views = is_whole_reached || {
+            let goal = left.goal(first_target * requested, &self.open);
+            allocate(&goal, u64::MAX).0 <= times(budget, BUDGET_FOR_ALL)
+        };
         let mut target = first_target;
         let (goal, (mut added, mut wanted)) = loop {
-            let for_all = left.goal(target * requested, &self.open);
-            let allocated = allocate(&for_all, budget);
-            // The mean over the level comes first where the rays may not suffice for every room.
-            let (goal, allocated) = match is_whole_reached || allocated.0 <= times(budget, BUDGET_FOR_ALL) {
-                true => (for_all, allocated),
-                false => {
-                    let of_whole = left.goal_of_whole(target * requested, &self.open);
-                    let allocated = allocate(&of_whole, budget);
-                    (of_whole, allocated)
-                }
+            let goal = match aims_at_views {
+                true => left.goal(target * requested, &self.open),
+                false => left.goal_of_whole(target * requested, &self.open),
             };
+            let allocated = allocate(&goal, budget);
             if allocated.0 >= worthwhile || budget < worthwhile || target < LEAST_TARGET {
                 break (goal, allocated);
             }

@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::BakeError;
-use crate::chunks::in_chunks_until_deadline;
+use crate::chunks::in_chunks;
 use crate::color::channel_mean;
 use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel, receiver};
 use crate::direct_light::{DirectLight, LocalLight};
@@ -24,13 +24,20 @@ const STEEP: f32 = 0.5;
 /// steep too, but rays reach both of its sides.
 const MIN_LIGHT: f64 = 2.0;
 
-/// Cells along a texel's side.
+/// Cells along a texel's side, at most and at least.
 const CELLS: u32 = 8;
-/// Where there are many such texels they have fewer cells: no more than this many per covered texel of the level.
+const LEAST_CELLS: u32 = 2;
+/// Where there are many such texels they have fewer cells, down to 2 x 2, so that cells take no more memory than a number
+/// per covered texel, and about as long as two shadow rays from each: no more than this many per covered texel.
 const CELLS_PER_TEXEL: usize = 1;
+/// The share of the time left in which cells may be computed, if it is limited. The texels after that have one value,
+/// as a complete map is more urgent.
+const TIME_SHARE: f64 = 0.1;
 /// Shadow rays to each lamp from a point of a cell, whose noise all rays share that read it. In a cell alone it may be
 /// large; the mean over the texel is scaled to the texel's light, which has far less.
 const SAMPLES: u32 = 1;
+/// The same in a texel that a wall divides, whose cells cannot be scaled.
+const SAMPLES_OF_DIVIDED: u32 = 8;
 /// Cells whose mean is so many times the texel's light, or such a part of it, have missed what lights the texel.
 const MAX_SCALE: f32 = 4.0;
 
@@ -58,30 +65,41 @@ struct TexelCells {
 
 impl SteepLight {
     /// Computes the light of all texels whose direct light is steep, as far as there is time. Also returns these texels.
+    /// `direct_by_place` is the direct light per texel of all maps, NaN where it is not known.
     pub fn new(
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
         direct: &DirectLight,
+        direct_by_place: &[Vec3],
         seed: u32,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(Self, Vec<MapTexel>), BakeError> {
-        let steep: Vec<CoveredTexel> = monitor
-            .run_interruptible(0.0, || steep_texels(texels, &direct.by_place(texels), &direct.local))?;
+        let steep: Vec<CoveredTexel> =
+            monitor.run_interruptible(0.0, || steep_texels(texels, direct_by_place, &direct.local))?;
         let most = CELLS_PER_TEXEL * texels.list.len();
         let side = std::iter::successors(Some(CELLS), |side| Some(side / 2))
-            .find(|side| *side <= 1 || steep.len() * (side * side) as usize <= most)
-            .unwrap_or(1);
-        let count = if side > 1 { steep.len() } else { 0 };
-        let cells = in_chunks_until_deadline(count, monitor, |place| {
+            .find(|side| *side <= LEAST_CELLS || steep.len() * (side * side) as usize <= most)
+            .unwrap_or(LEAST_CELLS);
+        let clock = monitor.clock();
+        let deadline = clock.seconds_left().map(|left| clock.seconds() + TIME_SHARE * left);
+        let cells_of_texels = in_chunks(steep.len(), monitor, |place| {
+            if deadline.is_some_and(|deadline| clock.seconds() > deadline) {
+                return TexelCells::unknown(side);
+            }
             let texel = steep[place];
             // A wall divides the texel, so that its one value, a mean of both sides, is that of neither.
             let is_divided = texels.divided.binary_search(&texel).is_ok();
             let mean = (!is_divided).then(|| direct.texels[texel.place()].total());
             texel_cells(sources, &texels.list[texel.place()], side, mean, seed)
         })?;
-        let rays = cells.iter().map(|cells| u64::from(cells.rays)).sum();
-        let places = steep.iter().take(cells.len()).map(|texel| texels.list[texel.place()].index).collect();
-        Ok((Self { side, cells: cells.into_iter().flat_map(|cells| cells.light).collect(), rays }, places))
+        let mut light =
+            Self { side, cells: Vec::with_capacity(steep.len() * (side * side) as usize), rays: 0 };
+        for TexelCells { light: of_texel, rays } in cells_of_texels {
+            light.cells.extend(of_texel);
+            light.rays += u64::from(rays);
+        }
+        let places = steep.iter().map(|texel| texels.list[texel.place()].index).collect();
+        Ok((light, places))
     }
 
     /// The numbers of the texels, in the order of [`SteepLight::new`].
@@ -94,6 +112,13 @@ impl SteepLight {
         let texel = (number.get() as usize - 1) * (self.side * self.side) as usize;
         let light = self.cells.get(texel + cell_at(offset, self.side))?;
         (!light.x.is_nan()).then_some(*light)
+    }
+}
+
+impl TexelCells {
+    /// Those of a texel for which there was no time.
+    fn unknown(side: u32) -> Self {
+        Self { light: vec![Vec3::NAN; (side * side) as usize], rays: 0 }
     }
 }
 
@@ -118,12 +143,13 @@ fn texel_cells(sources: &Sources<'_>, texel: &Texel, side: u32, mean: Option<Vec
         }
     };
     let sequence = Sequence::new(seed, Stream::SteepLight, texel.index.0);
+    let samples = if mean.is_some() { SAMPLES } else { SAMPLES_OF_DIVIDED };
     let (mut sums, mut counts) =
         (vec![Vec3::ZERO; (side * side) as usize], vec![0u32; (side * side) as usize]);
     let (mut total, mut rays) = (Vec3::ZERO, 0);
     for (number, point) in points.iter().enumerate() {
         let at = receiver(scene, point);
-        let direct = sources.irradiance(sequence.of(number as u32), SAMPLES, &|_, _| Some(at));
+        let direct = sources.irradiance(sequence.of(number as u32), samples, &|_, _| Some(at));
         let cell = cell_at(point.offset, side);
         sums[cell] += direct.total();
         counts[cell] += 1;
@@ -191,30 +217,35 @@ mod tests {
         }
     }
 
+    /// A texel on one triangle, and one that two share.
     #[test]
     fn cells_have_the_light_of_their_middles() {
         on_a_floor(8, |texels, _| {
-            let texel = &texels.list[2 * 8 + 5];
-            let emitter = lamp_above(texels, texel);
-            let sources = Sources::new(texels.scene, vec![emitter], Vec::new(), Vec3::ZERO);
-            let TexelCells { light, rays } = texel_cells(&sources, texel, CELLS, None, 1);
-            assert_eq!(rays, CELLS * CELLS);
-            let steep = SteepLight { side: CELLS, cells: light.clone(), rays: 0 };
-            let number = SteepLight::numbers().next().unwrap();
-            for (x, y) in (0..CELLS).flat_map(|y| (0..CELLS).map(move |x| (x, y))) {
-                let middle = (Vec2::new(x as f32, y as f32) + 0.5) / CELLS as f32;
-                let point = receiver(texels.scene, &texel.point(texels.scene, middle.x, middle.y).unwrap());
-                let root = sources.emitter_tree.root().unwrap();
-                let exact = sources.emitter_tree.unoccluded(&sources.emitters, root, &point);
-                for corner in [Vec2::splat(-0.06), Vec2::ZERO, Vec2::splat(0.06)] {
-                    let cell = steep.at(number, middle + corner).unwrap();
-                    assert!(cell.distance(exact) < 1e-5 * exact.length(), "{middle}: {cell} {exact}");
+            for texel in [&texels.list[2 * 8 + 5], &texels.list[4 * 8 + 4]] {
+                let emitter = lamp_above(texels, texel);
+                let sources = Sources::new(texels.scene, vec![emitter], Vec::new(), Vec3::ZERO);
+                let TexelCells { light, rays } = texel_cells(&sources, texel, CELLS, None, 1);
+                assert_eq!(rays, SAMPLES_OF_DIVIDED * CELLS * CELLS);
+                let steep = SteepLight { side: CELLS, cells: light.clone(), rays: 0 };
+                let number = SteepLight::numbers().next().unwrap();
+                for (x, y) in (0..CELLS).flat_map(|y| (0..CELLS).map(move |x| (x, y))) {
+                    let middle = (Vec2::new(x as f32, y as f32) + 0.5) / CELLS as f32;
+                    let point = texel.covered_point(texels.scene, middle.x, middle.y).unwrap();
+                    let root = sources.emitter_tree.root().unwrap();
+                    let at = receiver(texels.scene, &point);
+                    let exact = sources.emitter_tree.unoccluded(&sources.emitters, root, &at);
+                    for corner in [Vec2::splat(-0.06), Vec2::ZERO, Vec2::splat(0.06)] {
+                        let cell = steep.at(number, middle + corner).unwrap();
+                        assert!(cell.distance(exact) < 1e-5 * exact.length(), "{middle}: {cell} {exact}");
+                    }
                 }
+                let brightest = light.iter().map(|light| light.y).fold(0.0, f32::max);
+                let darkest = light.iter().map(|light| light.y).fold(f32::INFINITY, f32::min);
+                assert!(brightest > 10.0 * darkest, "{darkest} to {brightest}");
+                assert_eq!(steep.at(SteepLight::numbers().nth(1).unwrap(), Vec2::ZERO), None);
+                let unknown = SteepLight { cells: TexelCells::unknown(CELLS).light, ..steep };
+                assert_eq!(unknown.at(number, Vec2::splat(0.5)), None);
             }
-            let brightest = light.iter().map(|light| light.y).fold(0.0, f32::max);
-            let darkest = light.iter().map(|light| light.y).fold(f32::INFINITY, f32::min);
-            assert!(brightest > 10.0 * darkest, "{darkest} to {brightest}");
-            assert_eq!(steep.at(SteepLight::numbers().nth(1).unwrap(), Vec2::ZERO), None);
         });
     }
 

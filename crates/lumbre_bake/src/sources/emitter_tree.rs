@@ -6,7 +6,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{DMat3, DVec3, Mat3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 
 use super::emitter_bounds::EmitterBounds;
 use super::emitter_walk::{EmitterChoice, EmitterWalk};
@@ -46,15 +46,16 @@ struct Node {
     kind: NodeKind,
 }
 
-/// The first and second moments of the position of emitters that face the same way, about the centre of their power.
+/// The moments of the light of emitters that face the same way, about the centre of their power: weighted by radiance ·
+/// area, so that each channel has its own.
 #[derive(Clone, Copy, Debug)]
 struct FlatMoments {
     /// How far their corners are in front of the plane through the centre, at least and at most; negative behind it.
     offsets: [f32; 2],
-    /// Σ radiance · area · position: a column for each channel. Their sum is 0.
-    first: Mat3,
-    /// Σ power · position · positionᵀ / Σ power.
-    second: Mat3,
+    /// Σ light · position: x, y and z.
+    first: [Vec3; 3],
+    /// Σ light · position · positionᵀ: xx, yy, zz, xy, xz and yz.
+    second: [Vec3; 6],
 }
 
 /// How much of emitters that face the same way a receiver may see: it and they are above each other's horizons.
@@ -72,7 +73,8 @@ pub(crate) const EXACT_EMITTERS: u32 = 48;
 /// times the difference of its normals.
 const OPENING: f32 = 0.05;
 /// The same for nodes whose emitters all face the same way: their light is expanded to the second order about their
-/// centre, so that the relative error is of the order of (r/d)³.
+/// centre, channel by channel, so that the relative error is of the order of (r/d)³; near the receiver's horizon, of
+/// (r/d)² times radius over height.
 const FLAT_OPENING: f32 = 0.15;
 /// Emitters face the same way if their normals differ from the mean by no more than this.
 const FLAT: f32 = 1e-4;
@@ -364,26 +366,32 @@ impl FlatMoments {
         if bounds.spread > FLAT {
             return None;
         }
-        let (mut first, mut second, mut power) = (DMat3::ZERO, DMat3::ZERO, 0.0);
+        let (mut first, mut second) = ([DVec3::ZERO; 3], [DVec3::ZERO; 6]);
         let mut offsets = [f32::INFINITY, f32::NEG_INFINITY];
         for emitter in emitters {
             let light = emitter.radiance.as_dvec3() * f64::from(emitter.area);
             let corners = emitter.corners_f64.map(|corner| corner - bounds.center.as_dvec3());
-            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-            first += outer_product(middle, light);
             for corner in corners {
                 let offset = corner.dot(bounds.axis.as_dvec3()) as f32;
                 offsets = [offsets[0].min(offset), offsets[1].max(offset)];
             }
-            // Over a triangle the mean of ppᵀ is that of its middle and, about that, a twelfth of the corners' sum.
-            let about_middle = corners.map(|corner| outer_product(corner - middle, corner - middle));
-            let of_triangle = outer_product(middle, middle)
-                + (about_middle[0] + about_middle[1] + about_middle[2]) * (1.0 / 12.0);
-            second += of_triangle * light.element_sum();
-            power += light.element_sum();
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+            for (moment, place) in first.iter_mut().zip(middle.to_array()) {
+                *moment += light * place;
+            }
+            // Over a triangle the mean of a product is that of its middle and, about that, a twelfth of the corners' sum.
+            let mut products = products(middle, middle);
+            for corner in corners {
+                let about_middle = self::products(corner - middle, corner - middle);
+                products = std::array::from_fn(|place| products[place] + about_middle[place] / 12.0);
+            }
+            for (moment, product) in second.iter_mut().zip(products) {
+                *moment += light * product;
+            }
         }
-        let second = second * (1.0 / power);
-        second.is_finite().then(|| Self { offsets, first: first.as_mat3(), second: second.as_mat3() })
+        let moments =
+            Self { offsets, first: first.map(|m| m.as_vec3()), second: second.map(|m| m.as_vec3()) };
+        moments.first.iter().chain(&moments.second).all(|moment| moment.is_finite()).then_some(moments)
     }
 
     /// What a receiver of which the centre is `towards` away may see.
@@ -406,7 +414,7 @@ impl FlatMoments {
 
     /// The irradiance that emitters of normal `axis` and of so much light (Σ radiance · area) bring to a receiver of
     /// which the centre is `towards` away, with all of them above its horizon and it above theirs: the kernel
-    /// f(t) = (n·t)(-a·t) / |t|⁴ to the second order, f light + first moment ∇f + light (second moment : ∇∇f) / 2.
+    /// f(t) = (n·t)(-a·t) / |t|⁴ to the second order, light f + first moments · ∇f + second moments : ∇∇f / 2.
     fn light_at(&self, light: Vec3, axis: Vec3, towards: Vec3, normal: Vec3) -> Vec3 {
         let inverse = towards.length_squared().recip();
         let (height, above) = (towards.dot(normal), -towards.dot(axis));
@@ -414,19 +422,34 @@ impl FlatMoments {
         // ∇((n·t)(-a·t))
         let slope = above * normal - height * axis;
         let gradient = slope * (inverse * inverse) - towards * (4.0 * value * inverse);
-        let [across, along] = [axis, towards].map(|vector| self.second * vector);
-        let trace = self.second.x_axis.x + self.second.y_axis.y + self.second.z_axis.z;
-        let curvature = -2.0 * normal.dot(across) * inverse * inverse
-            - 8.0 * slope.dot(along) * inverse * inverse * inverse
-            - 4.0 * value * inverse * trace
-            + 24.0 * value * inverse * inverse * towards.dot(along);
-        light * (value + 0.5 * curvature) + self.first.transpose() * gradient
+        let of_normals = symmetric_products(normal, axis).map(|product| -product * inverse * inverse);
+        let of_slopes = symmetric_products(slope, towards).map(|product| -4.0 * product * inverse.powi(3));
+        let of_offsets = products(towards.as_dvec3(), towards.as_dvec3())
+            .map(|product| 24.0 * value * inverse * inverse * product as f32);
+        let diagonal = -4.0 * value * inverse;
+        let mut sum = light * value;
+        for (moment, slope) in self.first.into_iter().zip(gradient.to_array()) {
+            sum += moment * slope;
+        }
+        for (place, moment) in self.second.into_iter().enumerate() {
+            let curvature = of_normals[place] + of_slopes[place] + of_offsets[place];
+            // What is off the diagonal counts twice.
+            let weight = if place < 3 { 0.5 * (curvature + diagonal) } else { curvature };
+            sum += moment * weight;
+        }
+        sum.max(Vec3::ZERO)
     }
 }
 
-/// a bᵀ
-fn outer_product(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+/// The entries of a bᵀ: xx, yy, zz, xy, xz and yz.
+fn products(a: DVec3, b: DVec3) -> [f64; 6] {
+    [a.x * b.x, a.y * b.y, a.z * b.z, a.x * b.y, a.x * b.z, a.y * b.z]
+}
+
+/// The entries of a bᵀ + b aᵀ, in the same order.
+fn symmetric_products(a: Vec3, b: Vec3) -> [f32; 6] {
+    let both = |i: usize, j: usize| a[i] * b[j] + b[i] * a[j];
+    [both(0, 0), both(1, 1), both(2, 2), both(0, 1), both(0, 2), both(1, 2)]
 }
 
 /// A node over `members`, without children, and its bounds.

@@ -74,17 +74,20 @@ fn approximating_distant_nodes_by_one_term_is_close_to_the_exact_sum() {
     assert!(worst < 0.03 && squares.sqrt() < f64::from(TERM_ERROR), "{worst} {squares}");
 }
 
-/// A screen of 48 x 24 squares of random colours that faces down, wholly above the horizon of receivers or not.
-#[test]
-fn distant_parts_of_a_flat_lamp_are_close_to_the_exact_sum() {
+/// A lamp of 48 x 24 squares of random colours, 2 wide and 1 deep, that faces down at a height of 1.
+fn screen() -> Vec<Emitter> {
     let color = |i: i32| {
         let [x, y, z, _] = Sequence::new(9, Stream::Test(0), 0).point(i as u32, 0);
         Vec3::new(x, y, z * z * z).powf(3.0)
     };
-    let place = |i: i32| Vec3::new((i % 48) as f32 / 24.0 - 1.0, 1.0, (i / 48) as f32 / 24.0 - 0.5);
-    let emitters: Vec<Emitter> = (0..48 * 24)
-        .flat_map(|i| square(place(i), 1.0 / 24.0).map(|half| Emitter { radiance: color(i), ..half }))
-        .collect();
+    let place = |i: i32| Vec3::new(((i % 48) as f32 - 23.5) / 24.0, 1.0, ((i / 48) as f32 - 11.5) / 24.0);
+    let colored = |i: i32| square(place(i), 1.0 / 24.0).map(|half| Emitter { radiance: color(i), ..half });
+    (0..48 * 24).flat_map(colored).collect()
+}
+
+#[test]
+fn distant_parts_of_a_flat_lamp_are_close_to_the_exact_sum() {
+    let emitters = screen();
     let tree = EmitterTree::new(&emitters, &vec![0; emitters.len()]);
     let (mut worst, mut squares) = (0.0f64, 0.0);
     for i in 0..400 {
@@ -99,6 +102,79 @@ fn distant_parts_of_a_flat_lamp_are_close_to_the_exact_sum() {
     }
     println!("worst of 400: {:.4} %, RMS {:.4} %", 100.0 * worst, 100.0 * squares.sqrt());
     assert!(worst < 0.01 && squares.sqrt() < 0.3 * f64::from(TERM_ERROR), "{worst} {squares}");
+}
+
+/// Each channel has its own place on the lamp: a red middle, a blue corner, and a green strip along an edge.
+#[test]
+fn every_channel_of_a_flat_lamp_is_close_to_its_exact_sum() {
+    let turn = glam::Quat::from_rotation_y(0.7) * glam::Quat::from_rotation_x(2.1);
+    let color = |middle: Vec3| {
+        let is_red = middle.x.abs() < 0.5 && middle.z.abs() < 0.25;
+        let is_blue = middle.x > 0.8 && middle.z > 0.4;
+        [is_red, middle.z < -0.4, is_blue].map(|is_lit| f32::from(u8::from(is_lit)))
+    };
+    let turned =
+        |part: Emitter| emitter(part.corners.map(|corner| turn * corner), color(part.middle()).into());
+    let emitters: Vec<Emitter> = screen().into_iter().map(turned).collect();
+    let tree = EmitterTree::new(&emitters, &vec![0; emitters.len()]);
+    let (mut worst, mut squares) = (0.0f64, 0.0);
+    for i in 0..1000 {
+        let [x, y, z, w] = Sequence::new(8, Stream::Test(0), 0).point(i, 0);
+        let position = turn * Vec3::new(8.0 * x - 4.0, 0.9 - 3.0 * y, 8.0 * z - 4.0);
+        let at = receiver(position, turn * Vec3::new(w - 0.5, 1.0, 0.4 - 0.8 * w).normalize());
+        let (computed, expected) = (tree.unoccluded(&emitters, 0, &at).as_dvec3(), exact(&emitters, &at));
+        let floor = 1e-2 * expected.element_sum() + 1e-6;
+        let error = ((computed - expected).abs() / (expected + floor)).max_element();
+        (worst, squares) = (worst.max(error), squares + error * error / 1000.0);
+        assert!(computed.min_element() >= 0.0, "{computed}");
+    }
+    println!("worst of 1000: {:.4} %, RMS {:.4} %", 100.0 * worst, 100.0 * squares.sqrt());
+    // The worst are near the receiver's horizon.
+    assert!(worst < 0.05 && squares.sqrt() < 0.5 * f64::from(TERM_ERROR), "{worst} {squares}");
+}
+
+#[test]
+fn a_flat_lamp_brings_nothing_behind_and_in_its_plane_and_the_exact_light_across_its_horizon() {
+    let emitters = screen();
+    let tree = EmitterTree::new(&emitters, &vec![0; emitters.len()]);
+    let root = tree.root().unwrap();
+    let flat = tree.nodes[root as usize].flat.unwrap();
+    let bounds = tree.bounds(root);
+    for i in 0..100 {
+        let [x, y, z, w] = Sequence::new(4, Stream::Test(0), 0).point(i, 0);
+        let at =
+            |height: f32, normal: Vec3| receiver(Vec3::new(3.0 * x - 1.5, height, 3.0 * z - 1.5), normal);
+        let view = |at: &Receiver| flat.view(&bounds, bounds.center - at.position, at.normal);
+        let tilted = Vec3::new(w - 0.5, y - 0.5, 0.3).normalize();
+        for dark in
+            [at(1.0, Vec3::NEG_Y), at(0.3, Vec3::NEG_Y), at(1.001 + y, Vec3::NEG_Y), at(1.001, tilted)]
+        {
+            assert_eq!(view(&dark), FlatView::None, "{dark:?}");
+            assert_eq!(tree.unoccluded(&emitters, root, &dark), Vec3::ZERO);
+        }
+        assert_eq!(view(&at(0.9, Vec3::Y)), FlatView::Whole);
+        // Close below its plane, with some of it below the receiver's horizon.
+        let near = at(0.95, tilted);
+        let (computed, expected) =
+            (tree.unoccluded(&emitters, root, &near).as_dvec3(), exact(&emitters, &near));
+        let error = (computed - expected).abs().element_sum();
+        assert!(error <= 0.01 * expected.element_sum() + 1e-6, "{near:?}: {computed} {expected}");
+    }
+}
+
+#[test]
+fn the_distance_of_a_lamp_is_that_of_its_emitters_and_not_of_the_sphere_around_it() {
+    let emitters = screen();
+    let tree = EmitterTree::new(&emitters, &vec![0; emitters.len()]);
+    for i in 0..100 {
+        let [x, y, z, _] = Sequence::new(6, Stream::Test(0), 0).point(i, 0);
+        let at = receiver(Vec3::new(4.0 * x - 2.0, 1.6 * y, 4.0 * z - 2.0), Vec3::Y);
+        // That of the rectangle.
+        let outside = (at.position - Vec3::Y).abs() - Vec3::new(1.0, 0.0, 0.5);
+        let exact = outside.max(Vec3::ZERO).length();
+        let distance = tree.distance(0, &at);
+        assert!(distance <= exact + 1e-5 && distance >= 0.6 * exact - 0.05, "{distance} of {exact}");
+    }
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub(crate) struct SampledReceiver<'a, P: SurfacePoints> {
     pub covered: Option<&'a dyn Fn(f32, f32) -> Option<Receiver>>,
     /// Whether it is a single point, so that its light need not be averaged.
     pub is_point: bool,
-    /// The side of a receiver that is flat and square, canonical units: at a distance its middle stands for all of it.
+    /// The longer side of a receiver that is flat, canonical units: at a distance its middle stands for all of it.
     pub flat_side: Option<f32>,
     /// What is known of the occluders between it and the sources.
     pub visibility: &'a Visibility<'a>,
