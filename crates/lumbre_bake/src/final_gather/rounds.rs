@@ -46,9 +46,6 @@ const RAYS_FOR_VIEWS: f64 = 1.5;
 /// Direct light and the gather together may take this multiple of the quality's limit: where direct light is simple, more
 /// rays go to the bounces.
 const WITH_DIRECT_LIGHT: f64 = 2.15;
-/// Before the mean over the level reaches the requested error, a round aims at that of every view, too, if this takes no
-/// more than such a share of the rays that are left.
-const BUDGET_FOR_ALL: f64 = 0.2;
 /// A round that adds a smaller fraction of the rays cast, or fewer per texel than [`WORTHWHILE_PER_TEXEL`], is not worth
 /// another smoothing either, which takes as long as three or four rays per texel: while a round needs fewer, it aims at
 /// [`LOWER_TARGET`] of the squared error, down to [`LEAST_TARGET`] of what was requested.
@@ -375,14 +372,10 @@ impl<'a> RoundPlanner<'a> {
             let wanted = allocator.within(most, goal.sum);
             (allocator.added(&wanted), wanted)
         };
-        // The mean over the level comes first where the rays may not suffice for every room.
-        let aims_at_views = is_whole_reached || {
-            let goal = left.goal(first_target * requested, &self.open);
-            allocate(&goal, u64::MAX).0 <= times(budget, BUDGET_FOR_ALL)
-        };
         let mut target = first_target;
         let (goal, (mut added, mut wanted)) = loop {
-            let goal = match aims_at_views {
+            // The mean over the level comes first: the rays may not suffice for every room.
+            let goal = match is_whole_reached {
                 true => left.goal(target * requested, &self.open),
                 false => left.goal_of_whole(target * requested, &self.open),
             };
