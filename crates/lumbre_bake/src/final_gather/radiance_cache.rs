@@ -59,7 +59,7 @@ impl<'a> RadianceCache<'a> {
         let mut direct_by_place = direct.by_place(texels);
         monitor.pass(STEEP_PROGRESS);
         let (steep, steep_texels) =
-            SteepLight::new(sources, texels, direct, &direct_by_place, options.seed, monitor)?;
+            SteepLight::new(sources, texels, direct, &direct_by_place, options, monitor)?;
         // Its one value, a mean of both sides of the wall, would be wrong on either.
         for texel in &texels.divided {
             direct_by_place[texels.list[texel.place()].index.place()] = Vec3::NAN;

@@ -8,7 +8,6 @@ use std::num::NonZeroU32;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::BakeError;
 use crate::chunks::in_chunks;
 use crate::color::channel_mean;
 use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel, receiver};
@@ -17,6 +16,7 @@ use crate::monitor::BakeMonitor;
 use crate::sampling::{Sequence, Stream};
 use crate::sources::Sources;
 use crate::texel_index::{CoveredTexel, MapTexel};
+use crate::{BakeError, BakeOptions};
 
 /// A texel's direct light is steep if that of the texels around it differs by more than this share of the brightest.
 const STEEP: f32 = 0.5;
@@ -33,11 +33,11 @@ const CELLS_PER_TEXEL: usize = 1;
 /// The share of the time left in which cells may be computed, if it is limited. The texels after that have one value,
 /// as a complete map is more urgent.
 const TIME_SHARE: f64 = 0.1;
-/// Shadow rays to each lamp from a point of a cell, whose noise all rays share that read it. In a cell alone it may be
-/// large; the mean over the texel is scaled to the texel's light, which has far less.
-const SAMPLES: u32 = 1;
-/// The same in a texel that a wall divides, whose cells cannot be scaled.
-const SAMPLES_OF_DIVIDED: u32 = 8;
+/// Shadow rays to each lamp from a point of a cell, as a share of those from a texel in the first pass of direct light: one
+/// at the default quality. All rays that read a cell share its noise. In a cell alone it may be large; the mean over the
+/// texel is scaled to the texel's light, which has far less. The cells of a texel that a wall divides cannot be scaled, and
+/// have as many rays as a texel.
+const SAMPLES_SHARE: u32 = 8;
 /// Cells whose mean is so many times the texel's light, or such a part of it, have missed what lights the texel.
 const MAX_SCALE: f32 = 4.0;
 
@@ -71,7 +71,7 @@ impl SteepLight {
         texels: &CoveredTexels<'_>,
         direct: &DirectLight,
         direct_by_place: &[Vec3],
-        seed: u32,
+        options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(Self, Vec<MapTexel>), BakeError> {
         let steep: Vec<CoveredTexel> =
@@ -90,7 +90,7 @@ impl SteepLight {
             // A wall divides the texel, so that its one value, a mean of both sides, is that of neither.
             let is_divided = texels.divided.binary_search(&texel).is_ok();
             let mean = (!is_divided).then(|| direct.texels[texel.place()].total());
-            texel_cells(sources, &texels.list[texel.place()], side, mean, seed)
+            texel_cells(sources, &texels.list[texel.place()], side, mean, options)
         })?;
         let mut light =
             Self { side, cells: Vec::with_capacity(steep.len() * (side * side) as usize), rays: 0 };
@@ -130,7 +130,13 @@ fn cell_at(offset: Vec2, side: u32) -> usize {
 }
 
 /// The light of a texel's cells, scaled such that its mean is that of the texel, if one is given.
-fn texel_cells(sources: &Sources<'_>, texel: &Texel, side: u32, mean: Option<Vec3>, seed: u32) -> TexelCells {
+fn texel_cells(
+    sources: &Sources<'_>,
+    texel: &Texel,
+    side: u32,
+    mean: Option<Vec3>,
+    options: &BakeOptions,
+) -> TexelCells {
     let scene = sources.scene;
     let points: Vec<FootprintPoint> = match &texel.footprint {
         // Only these points are known to be in the open.
@@ -142,8 +148,9 @@ fn texel_cells(sources: &Sources<'_>, texel: &Texel, side: u32, mean: Option<Vec
             middles.filter_map(|Vec2 { x, y }| texel.covered_point(scene, x, y)).collect()
         }
     };
-    let sequence = Sequence::new(seed, Stream::SteepLight, texel.index.0);
-    let samples = if mean.is_some() { SAMPLES } else { SAMPLES_OF_DIVIDED };
+    let sequence = Sequence::new(options.seed, Stream::SteepLight, texel.index.0);
+    let [of_texel, ..] = options.effort().direct;
+    let samples = if mean.is_some() { (of_texel / SAMPLES_SHARE).max(1) } else { of_texel };
     let (mut sums, mut counts) =
         (vec![Vec3::ZERO; (side * side) as usize], vec![0u32; (side * side) as usize]);
     let (mut total, mut rays) = (Vec3::ZERO, 0);
@@ -224,8 +231,9 @@ mod tests {
             for texel in [&texels.list[2 * 8 + 5], &texels.list[4 * 8 + 4]] {
                 let emitter = lamp_above(texels, texel);
                 let sources = Sources::new(texels.scene, vec![emitter], Vec::new(), Vec3::ZERO);
-                let TexelCells { light, rays } = texel_cells(&sources, texel, CELLS, None, 1);
-                assert_eq!(rays, SAMPLES_OF_DIVIDED * CELLS * CELLS);
+                let options = BakeOptions::default();
+                let TexelCells { light, rays } = texel_cells(&sources, texel, CELLS, None, &options);
+                assert_eq!(rays, options.effort().direct[0] * CELLS * CELLS);
                 let steep = SteepLight { side: CELLS, cells: light.clone(), rays: 0 };
                 let number = SteepLight::numbers().next().unwrap();
                 for (x, y) in (0..CELLS).flat_map(|y| (0..CELLS).map(move |x| (x, y))) {
@@ -256,7 +264,8 @@ mod tests {
             let emitter = lamp_above(texels, texel);
             let sources = Sources::new(texels.scene, vec![emitter], Vec::new(), Vec3::ZERO);
             let mean_of = |cells: &TexelCells| cells.light.iter().sum::<Vec3>() / cells.light.len() as f32;
-            let cells = |mean: Option<Vec3>| texel_cells(&sources, texel, CELLS, mean, 1);
+            let options = BakeOptions::default();
+            let cells = |mean: Option<Vec3>| texel_cells(&sources, texel, CELLS, mean, &options);
             let unscaled = mean_of(&cells(None));
             for factor in [0.5, 1.0, 3.0] {
                 let mean = mean_of(&cells(Some(factor * unscaled)));

@@ -205,13 +205,17 @@ impl EmitterTree {
             let bounds = &self.bounds[index as usize];
             distance_to_sphere(bounds.center, bounds.radius, receiver)
         };
-        let (mut nearest, mut open) = (f32::INFINITY, vec![(to_sphere(index), index)]);
+        let is_large = |distance: f32, index: u32| self.bounds[index as usize].radius > DIVIDED * distance;
+        let distance = to_sphere(index);
+        if !is_large(distance, index) {
+            return distance;
+        }
+        let (mut nearest, mut open) = (f32::INFINITY, vec![(distance, index)]);
         while let Some((distance, index)) = open.pop() {
             if distance >= nearest {
                 continue;
             }
-            let is_large = self.bounds[index as usize].radius > DIVIDED * distance;
-            match self.children(index).filter(|_| is_large) {
+            match self.children(index).filter(|_| is_large(distance, index)) {
                 None => nearest = distance,
                 Some(children) => {
                     let [near, far] = children.map(|child| (to_sphere(child), child));
@@ -380,13 +384,12 @@ impl FlatMoments {
                 *moment += light * place;
             }
             // Over a triangle the mean of a product is that of its middle and, about that, a twelfth of the corners' sum.
-            let mut products = products(middle, middle);
-            for corner in corners {
-                let about_middle = self::products(corner - middle, corner - middle);
-                products = std::array::from_fn(|place| products[place] + about_middle[place] / 12.0);
-            }
-            for (moment, product) in second.iter_mut().zip(products) {
-                *moment += light * product;
+            for (offset, weight) in
+                corners.map(|corner| (corner - middle, 1.0 / 12.0)).into_iter().chain([(middle, 1.0)])
+            {
+                for (moment, square) in second.iter_mut().zip(squares(offset)) {
+                    *moment += light * (weight * square);
+                }
             }
         }
         let moments =
@@ -424,8 +427,9 @@ impl FlatMoments {
         let gradient = slope * (inverse * inverse) - towards * (4.0 * value * inverse);
         let of_normals = symmetric_products(normal, axis).map(|product| -product * inverse * inverse);
         let of_slopes = symmetric_products(slope, towards).map(|product| -4.0 * product * inverse.powi(3));
-        let of_offsets = products(towards.as_dvec3(), towards.as_dvec3())
-            .map(|product| 24.0 * value * inverse * inverse * product as f32);
+        // Both of its products are the same.
+        let of_offsets =
+            symmetric_products(towards, towards).map(|product| 12.0 * value * inverse * inverse * product);
         let diagonal = -4.0 * value * inverse;
         let mut sum = light * value;
         for (moment, slope) in self.first.into_iter().zip(gradient.to_array()) {
@@ -441,9 +445,9 @@ impl FlatMoments {
     }
 }
 
-/// The entries of a bᵀ: xx, yy, zz, xy, xz and yz.
-fn products(a: DVec3, b: DVec3) -> [f64; 6] {
-    [a.x * b.x, a.y * b.y, a.z * b.z, a.x * b.y, a.x * b.z, a.y * b.z]
+/// The entries of a aᵀ: xx, yy, zz, xy, xz and yz.
+fn squares(a: DVec3) -> [f64; 6] {
+    [a.x * a.x, a.y * a.y, a.z * a.z, a.x * a.y, a.x * a.z, a.y * a.z]
 }
 
 /// The entries of a bᵀ + b aᵀ, in the same order.
