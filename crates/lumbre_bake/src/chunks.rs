@@ -50,12 +50,22 @@ pub(crate) fn in_chunks_uncheckpointed<T: Send>(
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
     let mut values = Vec::with_capacity(count);
+    // They may take far longer than most values.
+    let mut size = MIN_SIZE;
     while values.len() < count {
-        let end = (values.len() + MIN_SIZE).min(count);
+        let begun = Instant::now();
+        let end = (values.len() + size).min(count);
         values.extend(compute_chunk(values.len(), end, count, monitor, &compute)?);
+        size = next_size(size, begun);
         monitor.advance(values.len() as f32 / count as f32)?;
     }
     Ok(values)
+}
+
+/// The number of values after a chunk of so many, which has just been computed.
+fn next_size(size: usize, begun: Instant) -> usize {
+    let on_time = size as f64 * CHUNK_SECONDS / begun.elapsed().as_secs_f64().max(1e-6);
+    (on_time as usize).min(4 * size).clamp(MIN_SIZE, MAX_SIZE)
 }
 
 /// Computes the values `start..end` of a list of `count`.
@@ -101,8 +111,7 @@ fn compute_chunks<T: Send + Record>(
             let end = (start + size).min(count);
             values.extend(compute_chunk(start, end, count, monitor, &compute)?);
             monitor.store_chunk(start, count, &values[start..]);
-            let next_size = size as f64 * CHUNK_SECONDS / begun.elapsed().as_secs_f64().max(1e-6);
-            size = (next_size as usize).min(4 * size).clamp(MIN_SIZE, MAX_SIZE);
+            size = next_size(size, begun);
         }
         monitor.advance(values.len() as f32 / count as f32)?;
     }

@@ -20,8 +20,10 @@ use crate::sources::{Direct, Sources};
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 
-/// Walks from a block, the same once the time is up, and the most steps of a walk.
+/// Walks from a block that has at least as many texels, the fewest from a smaller one, the same once the time is up, and
+/// the most steps of a walk.
 const WALKS: u32 = 32;
+const MIN_WALKS: u32 = 8;
 const LATE_WALKS: u32 = 4;
 const BOUNCES: u32 = 6;
 /// Blocks in view that a walk notes.
@@ -80,7 +82,7 @@ impl LocalLight {
             let walks = match is_late {
                 _ if members.is_empty() => 0,
                 true => LATE_WALKS,
-                false => WALKS,
+                false => (members.len() as u32).clamp(MIN_WALKS, WALKS),
             };
             (0..walks).map(|walk| walker.walk(members, block as u32, walk)).collect()
         })?;

@@ -70,7 +70,7 @@ fn form_factor_errors(
     let direct: Vec<Vec3> = PatchIndex::all(patches.list.len())
         .map(|index| {
             let sequence = Sequence::new(options.seed, Stream::PatchLight(0), index.0);
-            patch_direct(&sources, &patches, index, references[0].open[index.place()], sequence).0
+            patch_direct(&sources, &patches, index, references[0].open[index.place()], 8, sequence).0
         })
         .collect();
     let irradiance = |factors: &FormFactors| solution(factors, &patches, &direct, sources.sky);

@@ -18,8 +18,10 @@ use crate::sources::Sources;
 /// beyond the patch's border would be too large.
 const MIN_TEXELS: f64 = 2.0;
 
-/// Shadow rays from a patch to each source, for each of two halves.
+/// Shadow rays to each source from a patch of mean area or more, for each of two halves.
 const SHADOW_RAYS: u32 = 8;
+/// The fewest from a smaller one: the less it reflects into the scene, the less its noise matters.
+const MIN_SHADOW_RAYS: u32 = 2;
 
 /// Mean direct irradiance of each patch, mixed lights included, by two halves of its texels, the fields of a
 /// chessboard. `None` where there are too few texels. Texels that walls divide are left out, since they hold the light
@@ -85,6 +87,8 @@ pub(super) fn direct_halves(
 ) -> Result<([Vec<Vec3>; 2], u64), BakeError> {
     let mut halves = [Vec::new(), Vec::new()];
     let mut rays = 0;
+    let area = patches.list.iter().map(|patch| f64::from(patch.area)).sum::<f64>();
+    let mean_area = (area / patches.list.len().max(1) as f64) as f32;
     for (number, half) in (0..).zip(&mut halves) {
         let results: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), monitor, |place| {
             match known.get(place) {
@@ -93,7 +97,8 @@ pub(super) fn direct_halves(
             }
             let index = PatchIndex::new(place);
             let sequence = Sequence::new(seed, Stream::PatchLight(number), index.0);
-            patch_direct(sources, patches, index, open[place], sequence)
+            let shadow_rays = shadow_rays(patches.list[place].area / mean_area);
+            patch_direct(sources, patches, index, open[place], shadow_rays, sequence)
         })?;
         rays += results.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
         *half = results.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
@@ -101,13 +106,19 @@ pub(super) fn direct_halves(
     Ok((halves, rays))
 }
 
-/// Direct irradiance of a patch, and the rays that it took. `open` is the share of the patch that is not inside other
-/// geometry: the part inside receives nothing, so that the mean over the whole patch is divided by that share.
+/// Shadow rays to each source from a patch of so many times the mean area.
+fn shadow_rays(relative_area: f32) -> u32 {
+    ((relative_area * SHADOW_RAYS as f32) as u32).clamp(MIN_SHADOW_RAYS, SHADOW_RAYS)
+}
+
+/// Direct irradiance of a patch by so many shadow rays to each source, and the rays that it took in all. `open` is the
+/// share of the patch that is not inside other geometry: the part inside receives nothing, so that the mean over the whole patch is divided by that share.
 pub(crate) fn patch_direct(
     sources: &Sources<'_>,
     patches: &Patches,
     index: PatchIndex,
     open: f32,
+    shadow_rays: u32,
     sequence: Sequence,
 ) -> (Vec3, u32) {
     let (scene, patch) = (sources.scene, &patches.list[index.place()]);
@@ -125,7 +136,7 @@ pub(crate) fn patch_direct(
         let shading = if patch.side == Side::Front { shading } else { -shading };
         Some(Receiver { position, origin, geometric_normal: normal, normal: shading })
     };
-    let direct = sources.irradiance(sequence, SHADOW_RAYS, &point);
+    let direct = sources.irradiance(sequence, shadow_rays, &point);
     (direct.total() / open, direct.rays)
 }
 

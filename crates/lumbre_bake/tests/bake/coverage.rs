@@ -22,7 +22,7 @@ const MISSES: usize = 24;
 const PLACES: u32 = 3;
 /// The effort for a place: a standard error of a tenth of its light unless 25,000 paths leave more. Where the light
 /// comes through gaps that few paths find, a fixed number of them mostly traces too little light, and too little noise.
-const EFFORT: Effort = Effort { side: 20, error: 0.1, batches: [8, 64] };
+const EFFORT: Effort = Effort { side: 20, error: 0.1, batches: [4, 64] };
 /// What lies this far beyond a texel's middle, in texels, is another's.
 const HALF: f64 = 0.499;
 
