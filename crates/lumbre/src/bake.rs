@@ -3,6 +3,7 @@
 use std::ffi::OsString;
 use std::io::Write;
 use std::ops::ControlFlow;
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -11,8 +12,8 @@ use bevy_ecs::query::With;
 use bevy_ecs::world::World;
 use glam::DVec3;
 use lumbre::bake::{
-    BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Samples,
-    SamplesError, Solver, content_hash,
+    BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, PackedSamples, Probes,
+    Quality, Samples, SamplesError, Solver, content_hash,
 };
 use lumbre::demo::{ATLAS_SIDE, has_light_to_bake};
 use lumbre::optics::{Material, SurfaceSample};
@@ -61,8 +62,15 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     let interruption = Interruption::handle();
     let (report, samples) =
         interruptible(&interruption, &mut world, &options, former.as_ref(), &checkpoint, asked)?;
-    let saved = save_baked(&mut world, &source, &asked.output, &files)
-        .with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
+    // Compressing the samples takes as long as saving the level.
+    let (saved, samples) = std::thread::scope(|scope| {
+        let packing = samples.as_ref().map(|samples| scope.spawn(|| samples.packed()));
+        let saved = save_baked(&mut world, &source, &asked.output, &files);
+        let packed = packing.map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        (saved, packed)
+    });
+    let saved =
+        saved.with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
     for note in saved.notes {
         eprintln!("lumbre: note: {}: {note}", asked.output.display());
     }
@@ -72,7 +80,7 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     let lightmaps: Vec<FileLine> = saved.lightmaps.iter().map(FileLine::from).collect();
     BakeRecord::write(&asked.output, what, &saved.files, &lightmaps, &report)?;
     // The samples are written last: a bake that is continued has to start from the same previous samples.
-    keep_samples(asked, samples.as_ref());
+    keep_samples(asked, samples);
     checkpoint.remove().with_context(|| format!("{} cannot be removed", checkpoint.path.display()))?;
     print(&report, &lightmaps, asked.json)
 }
@@ -152,14 +160,14 @@ fn former_samples(output: &Path) -> Option<Samples> {
 
 /// Writes the samples for the next bake. Without new samples, for example because the time ran out, those of
 /// the previous bake stay valid.
-fn keep_samples(asked: &Bake, samples: Option<&Samples>) {
+fn keep_samples(asked: &Bake, samples: Option<Result<PackedSamples, SamplesError>>) {
     let path = samples_path(&asked.output);
     let done = match samples {
         _ if asked.no_reuse => match std::fs::remove_file(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
             _ => Ok(()),
         },
-        Some(samples) => samples.write(&path),
+        Some(samples) => samples.and_then(|samples| samples.write(&path)),
         None => Ok(()),
     };
     if let Err(error) = done {

@@ -89,7 +89,7 @@ pub use finish::baked_maps::{BakedMap, BakedObject, TexelErrors};
 pub use light_to_bake::has_light_to_bake;
 pub use monitor::Progress;
 pub use options::{BakeOptions, Density, FormFactorMethod, Probes, Quality, Solver};
-pub use rebake::{Samples, SamplesError};
+pub use rebake::{PackedSamples, Samples, SamplesError};
 pub use report::{
     BakeReport, Ended, ErrorAtTime, ErrorPart, ProbeReport, RebakeReport, ResolutionReport, SeamReport,
     StageTime, WorstPlace,

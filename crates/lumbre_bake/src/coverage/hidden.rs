@@ -16,7 +16,7 @@ use crate::BakeError;
 use crate::chunks::in_chunks;
 use crate::monitor::{BakeMonitor, Clock};
 use crate::sampling::{Sequence, Stream, cosine_about};
-use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::scene::{BakeScene, LightmapLayout, Receiver, SurfaceHit};
 use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::visibility::shaft::is_free_before;
 
@@ -34,6 +34,9 @@ const TILE_TEST_RAYS: u32 = 16;
 const LATE_TEST_RAYS: u32 = 2;
 /// Rays per point that classify it as open or hidden.
 const POINT_RAYS: u32 = 8;
+/// Rays from each corner and from the middle of what lies between contact lines. If all of them are clear, or all hit
+/// the inside of a solid, they decide for everything there.
+const AGREEING_RAYS: u32 = 2;
 /// Distance from a contact line, in texels, below which a point is classified by itself.
 const LINE_MARGIN: f64 = 0.05;
 /// Rays that must be clear for an open point if another is blocked: where faces touch, a single ray may slip out
@@ -225,22 +228,20 @@ fn fine_points(scene: &BakeScene, texel: &Texel) -> Option<Vec<FootprintPoint>> 
 fn classify(scene: &BakeScene, texel: &Texel, contacts: &ContactLines) -> OpenPoints {
     let Some(points) = fine_points(scene, texel) else { return OpenPoints::default() };
     let sequence = Sequence::new(SEED, Stream::HiddenView, texel.index.0);
-    let clearance = min_clearance(scene, texel);
+    let mut rays =
+        PointRays { scene, points: &points, sequence, clearance: min_clearance(scene, texel), cast: 0 };
     let knows_lines = has_all_lines(scene, texel);
-    let mut rays = 0;
-    let mut view_from = |index: usize| {
-        let (view, cast) = point_view(scene, &points[index], sequence, index as u32, clearance);
-        rays += cast;
-        view
-    };
     let mut open = vec![0u64; points.len().div_ceil(64)];
     let mut all_open = true;
     for group in between_lines(&points, contacts.in_texel(texel.index)) {
-        let views: Vec<PointView> =
-            corners_and_middle(&points, &group).into_iter().map(&mut view_from).collect();
-        let agreed = if knows_lines { common_view(&views) } else { equal_view(&views) };
+        let tested = corners_and_middle(&points, &group);
+        let agreed = if knows_lines { rays.agreed_view(&tested) } else { None };
+        let agreed = agreed.or_else(|| {
+            let views: Vec<PointView> = tested.into_iter().map(|index| rays.view(index)).collect();
+            if knows_lines { common_view(&views) } else { equal_view(&views) }
+        });
         for index in group {
-            if agreed.unwrap_or_else(|| view_from(index)) == PointView::Open {
+            if agreed.unwrap_or_else(|| rays.view(index)) == PointView::Open {
                 open[index / 64] |= 1 << (index % 64);
             } else {
                 all_open = false;
@@ -250,7 +251,7 @@ fn classify(scene: &BakeScene, texel: &Texel, contacts: &ContactLines) -> OpenPo
     if all_open {
         open.clear();
     }
-    OpenPoints { open, rays }
+    OpenPoints { open, rays: rays.cast }
 }
 
 /// As [`equal_view`], but points that saw only back faces side with the others: where the open is seen through few gaps,
@@ -337,37 +338,81 @@ enum PointView {
     BackFaces,
 }
 
-/// The view of a point, and the rays cast: fewer than [`POINT_RAYS`] where the first ones decide. The point is hidden if
-/// half of its rays hit the inside of a solid, or if too few are clear: none, or fewer than [`MIN_CLEAR`] where some are
-/// blocked.
-fn point_view(
-    scene: &BakeScene,
-    point: &FootprintPoint,
+/// What a ray from a point meets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Met {
+    /// The inside of a solid.
+    Inside,
+    /// A back face.
+    Back,
+    /// A lit surface almost at once.
+    Blocked,
+    /// Anything else, or nothing.
+    Clear,
+}
+
+/// The rays from a texel's points: those of a point are always the same.
+struct PointRays<'a> {
+    scene: &'a BakeScene,
+    points: &'a [FootprintPoint],
     sequence: Sequence,
-    index: u32,
+    /// Length below which a ray is blocked.
     clearance: f32,
-) -> (PointView, u32) {
-    let receiver = receiver(scene, point);
-    let (mut inside, mut blocked, mut clear) = (0, 0, 0);
-    for ray in 0..POINT_RAYS {
-        let [u, v, ..] = sequence.point(index * POINT_RAYS + ray, 0);
-        match scene.classify_hit(receiver.origin, cosine_about(receiver.geometric_normal, u, v)) {
-            SurfaceHit::Inside => inside += 1,
-            SurfaceHit::Back => {}
-            SurfaceHit::Lit { distance, .. } if distance < clearance => blocked += 1,
-            SurfaceHit::Lit { .. } | SurfaceHit::None => clear += 1,
-        }
-        let cast = ray + 1;
-        if 2 * inside >= POINT_RAYS {
-            return (PointView::Hidden, cast);
-        }
-        let enough = if blocked > 0 { MIN_CLEAR } else { 1 };
-        if 2 * (cast - inside) > POINT_RAYS && clear >= enough {
-            return (PointView::Open, cast);
+    /// Rays so far.
+    cast: u32,
+}
+
+impl PointRays<'_> {
+    /// Casts one of the [`POINT_RAYS`] rays of a point, which is the receiver.
+    fn met(&mut self, receiver: &Receiver, index: usize, ray: u32) -> Met {
+        self.cast += 1;
+        let [u, v, ..] = self.sequence.point(index as u32 * POINT_RAYS + ray, 0);
+        match self.scene.classify_hit(receiver.origin, cosine_about(receiver.geometric_normal, u, v)) {
+            SurfaceHit::Inside => Met::Inside,
+            SurfaceHit::Back => Met::Back,
+            SurfaceHit::Lit { distance, .. } if distance < self.clearance => Met::Blocked,
+            SurfaceHit::Lit { .. } | SurfaceHit::None => Met::Clear,
         }
     }
-    let view = if inside + blocked + clear == 0 { PointView::BackFaces } else { PointView::Hidden };
-    (view, POINT_RAYS)
+
+    /// The view of some points whose first rays are all clear, or all hit the inside of a solid.
+    fn agreed_view(&mut self, tested: &[usize]) -> Option<PointView> {
+        let mut first = None;
+        for &index in tested {
+            let receiver = receiver(self.scene, &self.points[index]);
+            for ray in 0..AGREEING_RAYS {
+                let met = self.met(&receiver, index, ray);
+                if met != *first.get_or_insert(met) || matches!(met, Met::Back | Met::Blocked) {
+                    return None;
+                }
+            }
+        }
+        Some(if first? == Met::Clear { PointView::Open } else { PointView::Hidden })
+    }
+
+    /// The view of a point, by fewer than [`POINT_RAYS`] rays where the first ones decide. The point is hidden if half of
+    /// its rays hit the inside of a solid, or if too few are clear: none, or fewer than [`MIN_CLEAR`] where some are
+    /// blocked.
+    fn view(&mut self, index: usize) -> PointView {
+        let receiver = receiver(self.scene, &self.points[index]);
+        let (mut inside, mut blocked, mut clear) = (0, 0, 0);
+        for ray in 0..POINT_RAYS {
+            match self.met(&receiver, index, ray) {
+                Met::Inside => inside += 1,
+                Met::Back => {}
+                Met::Blocked => blocked += 1,
+                Met::Clear => clear += 1,
+            }
+            if 2 * inside >= POINT_RAYS {
+                return PointView::Hidden;
+            }
+            let enough = if blocked > 0 { MIN_CLEAR } else { 1 };
+            if 2 * (ray + 1 - inside) > POINT_RAYS && clear >= enough {
+                return PointView::Open;
+            }
+        }
+        if inside + blocked + clear == 0 { PointView::BackFaces } else { PointView::Hidden }
+    }
 }
 
 #[cfg(test)]

@@ -32,4 +32,4 @@ mod samples_file;
 
 pub(crate) use around_bake::Rebake;
 pub use samples::Samples;
-pub use samples_file::SamplesError;
+pub use samples_file::{PackedSamples, SamplesError};

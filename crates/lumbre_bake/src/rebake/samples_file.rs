@@ -87,12 +87,38 @@ impl Samples {
     /// # Errors
     /// [`SamplesError::Io`]; a file that was there before is then unchanged.
     pub fn write(&self, path: &Path) -> Result<(), SamplesError> {
+        self.packed()?.write(path)
+    }
+
+    /// Compresses the samples as their file holds them. This takes longer than writing the file; a program that has
+    /// other files to write can do both at once.
+    ///
+    /// # Errors
+    /// [`SamplesError::Io`] if they cannot be compressed.
+    pub fn packed(&self) -> Result<PackedSamples, SamplesError> {
         let content = packed(&record::written(&self.0).map_err(io::Error::other)?)?;
+        Ok(PackedSamples { checksum: blake3::hash(&content), content })
+    }
+}
+
+/// Samples as their file holds them, from [`Samples::packed`].
+#[derive(Clone, Debug)]
+pub struct PackedSamples {
+    checksum: blake3::Hash,
+    content: Vec<u8>,
+}
+
+impl PackedSamples {
+    /// As [`Samples::write`].
+    ///
+    /// # Errors
+    /// [`SamplesError::Io`]; a file that was there before is then unchanged.
+    pub fn write(&self, path: &Path) -> Result<(), SamplesError> {
         replace_file(path, WhenBusy::Wait, |file| {
             file.write_all(MAGIC)?;
             file.write_all(&VERSION.to_le_bytes())?;
-            file.write_all(blake3::hash(&content).as_bytes())?;
-            file.write_all(&content)?;
+            file.write_all(self.checksum.as_bytes())?;
+            file.write_all(&self.content)?;
             file.sync_all()
         })?;
         Ok(())

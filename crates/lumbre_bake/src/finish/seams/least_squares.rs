@@ -32,8 +32,9 @@ const HALF_A_TEXEL: f64 = 0.25;
 const MAX_CHANGE: f64 = 2.0;
 /// Variance of a texel beside a chart, which shows no surface of its own, relative to that of its neighbours.
 const BESIDE_CHART: f64 = 4.0;
-/// Relative residual at which conjugate gradients stop, and the most steps they take.
-const RESIDUAL: f64 = 1e-6;
+/// Residual at which conjugate gradients stop, relative to that before any change, and the most steps they take. What is
+/// left of a jump is far less than the half floats of a map can show.
+const RESIDUAL: f64 = 1e-4;
 const MAX_STEPS: usize = 400;
 /// How many times the system is solved, each time without the texels that have reached their limit.
 const ACTIVE_SETS: u32 = 6;
@@ -267,8 +268,11 @@ impl<'a> Channel<'a> {
         let count = self.stiffness.len();
         let mut held = vec![false; count];
         let mut changes = vec![0.0; count];
+        let residual = self.residual(&held, &changes);
+        let energy: f64 = residual.iter().zip(&self.preconditioner).map(|(r, p)| r * (r * p)).sum();
+        let small_energy = RESIDUAL * RESIDUAL * energy;
         for _ in 0..patience.active_sets {
-            self.solve_free(&held, &mut changes, patience.steps);
+            self.solve_free(&held, &mut changes, patience.steps, small_energy);
             let mut any_clamped = false;
             for ((change, [low, high]), held) in changes.iter_mut().zip(&self.bounds).zip(&mut held) {
                 let within = change.clamp(*low, *high);
@@ -284,13 +288,21 @@ impl<'a> Channel<'a> {
     }
 
     /// Solves for the changes that are not held, starting from their current values.
-    fn solve_free(&self, held: &[bool], changes: &mut [f64], most_steps: usize) {
-        let mut residual: Vec<f64> =
-            self.gradient(changes, Some(&self.jumps)).into_iter().map(|value| -value).collect();
+    fn solve_free(&self, held: &[bool], changes: &mut [f64], most_steps: usize, small_energy: f64) {
+        let residual = self.residual(held, changes);
+        conjugate_gradients::solve(
+            &Free { channel: self, held, most_steps, small_energy },
+            changes,
+            residual,
+        );
+    }
+
+    /// What the changes that are not held leave of the system.
+    fn residual(&self, held: &[bool], changes: &[f64]) -> Vec<f64> {
+        let gradient = self.gradient(changes, Some(&self.jumps));
+        let mut residual: Vec<f64> = gradient.into_iter().map(|value| -value).collect();
         zero_held(held, &mut residual);
-        let energy: f64 = residual.iter().zip(&self.preconditioner).map(|(r, p)| r * (r * p)).sum();
-        let system = Free { channel: self, held, most_steps, small_energy: energy * RESIDUAL * RESIDUAL };
-        conjugate_gradients::solve(&system, changes, residual);
+        residual
     }
 
     /// The system's matrix times the changes `x`; with the jumps before any change, half the gradient of what is
