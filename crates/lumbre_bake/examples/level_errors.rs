@@ -4,10 +4,10 @@
 //!
 //! It bakes each level (all of them if none is named) and prints one row for it: errors at reference points away from
 //! shadow edges, relative to the light around a point. The reference points are read from the cache or from the tests'
-//! folder (not from the latter with `--anew`) and computed if there are none; with `--paths` they are computed by paths
-//! that no cached light cuts short, unbiased and noisy. With `--converged` the points show what a converged bake of the
-//! same texels has there: then the errors are those that more rays would remove, without what the map's resolution
-//! leaves and without a reference's noise.
+//! folder (not from the latter with `--anew`) and computed if there are none; `--points 0` does without. With `--paths`
+//! they are computed by paths that no cached light cuts short, unbiased and noisy. With `--converged` the points show
+//! what a converged bake of the same texels has there: then the errors are those that more rays would remove, without
+//! what the map's resolution leaves and without a reference's noise.
 //!
 //! With `--flip` the level's view is compared with that of a converged bake of the same texels, which is also stored in
 //! the cache; with `--pictures` the views are written, the converged one only with `--flip`.
@@ -128,10 +128,16 @@ fn print_row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
     let build = || world_of(Path::new(name));
     let name = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
     let name = name.as_ref();
-    let points = points(name, build()?, request)?;
+    let points = match request.points {
+        0 => Vec::new(),
+        _ => points(name, build()?, request)?,
+    };
     let mut world = build()?;
     let report = baked(&mut world, &request.options)?;
-    let errors = point_errors::measure(&mut world, &points);
+    let errors = match points.is_empty() {
+        true => PointErrors::default(),
+        false => point_errors::measure(&mut world, &points),
+    };
     let flip = match request.flip || request.pictures.is_some() {
         true => compared_views(name, &mut world, build, request)?,
         false => "-".to_owned(),

@@ -7,6 +7,8 @@ use super::path_tracer::Irradiance;
 
 /// A lower bound on the irradiance by which the error at a point is divided, in units of the region's mean irradiance.
 const FLOOR: f64 = 0.01;
+/// The same by which a bake's stated errors are divided, the lower bound of its local light.
+const FLOOR_OF_LOCAL_LIGHT: f64 = 1.0 / 16.0;
 
 /// Statistics of relative errors. The error at a point is the root mean square of its channels over an irradiance.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,6 +28,8 @@ pub struct SubsetErrors {
     pub points: usize,
     /// Relative to the point's own irradiance.
     pub to_point: RelativeErrors,
+    /// The same, with the lower bound of a bake's local light: in gaps of a millimetre there is next to none.
+    pub to_point_or_floor: RelativeErrors,
     /// Relative to the logarithmic average of the region's irradiance.
     pub to_log_average: RelativeErrors,
 }
@@ -77,15 +81,18 @@ pub fn local_errors(pairs: &[(Irradiance, DVec3)]) -> LocalErrors {
         mean: region,
         log_average,
         outside: average(&mut pairs.iter().filter(|(point, _)| !point.inside)),
-        all: subset(&inside, floor, log_average),
-        away_from_edges: subset(&away_from_edges, floor, log_average),
+        all: subset(&inside, region, log_average),
+        away_from_edges: subset(&away_from_edges, region, log_average),
     }
 }
 
-fn subset(pairs: &[(Irradiance, DVec3)], floor: f64, log_average: f64) -> SubsetErrors {
+/// The errors of some points of a region with this mean irradiance, and this logarithmic average.
+fn subset(pairs: &[(Irradiance, DVec3)], region: f64, log_average: f64) -> SubsetErrors {
+    let to_point = |floor: f64| relative_errors(pairs, |point| mean(point.value).max(floor * region));
     SubsetErrors {
         points: pairs.len(),
-        to_point: relative_errors(pairs, |point| mean(point.value).max(floor)),
+        to_point: to_point(FLOOR),
+        to_point_or_floor: to_point(FLOOR_OF_LOCAL_LIGHT),
         to_log_average: relative_errors(pairs, |_| log_average),
     }
 }
@@ -122,9 +129,11 @@ impl std::fmt::Display for LocalErrors {
             write!(f, "; mean E outside {:.4}", self.outside)?;
         }
         for (subset, which) in [(&self.all, "all"), (&self.away_from_edges, "away from shadow edges")] {
-            for (errors, to) in
-                [(&subset.to_point, "a point's own"), (&subset.to_log_average, "the log-average")]
-            {
+            for (errors, to) in [
+                (&subset.to_point, "a point's own"),
+                (&subset.to_point_or_floor, "a point's own or a sixteenth of the mean"),
+                (&subset.to_log_average, "the log-average"),
+            ] {
                 let [median, p95, rmse, noise, bias] =
                     [errors.median, errors.p95, errors.rmse, errors.noise, errors.bias].map(|x| 100.0 * x);
                 write!(
