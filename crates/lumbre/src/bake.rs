@@ -62,13 +62,11 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     let interruption = Interruption::handle();
     let (report, samples) =
         interruptible(&interruption, &mut world, &options, former.as_ref(), &checkpoint, asked)?;
-    // Compressing the samples takes as long as saving the level.
-    let (saved, samples) = std::thread::scope(|scope| {
-        let packing = samples.as_ref().map(|samples| scope.spawn(|| samples.packed()));
-        let saved = save_baked(&mut world, &source, &asked.output, &files);
-        let packed = packing.map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
-        (saved, packed)
-    });
+    // Compressing the samples takes as long as saving the level. If no thread can be started, they are not kept.
+    let packing = samples
+        .filter(|_| !asked.no_reuse)
+        .map(|samples| std::thread::Builder::new().name("samples".into()).spawn(move || samples.packed()));
+    let saved = save_baked(&mut world, &source, &asked.output, &files);
     let saved =
         saved.with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
     for note in saved.notes {
@@ -80,7 +78,8 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     let lightmaps: Vec<FileLine> = saved.lightmaps.iter().map(FileLine::from).collect();
     BakeRecord::write(&asked.output, what, &saved.files, &lightmaps, &report)?;
     // The samples are written last: a bake that is continued has to start from the same previous samples.
-    keep_samples(asked, samples);
+    let packed = packing.map(|thread| thread?.join().unwrap_or_else(|panic| resume_unwind(panic)));
+    keep_samples(asked, packed);
     checkpoint.remove().with_context(|| format!("{} cannot be removed", checkpoint.path.display()))?;
     print(&report, &lightmaps, asked.json)
 }

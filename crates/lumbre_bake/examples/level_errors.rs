@@ -134,14 +134,33 @@ fn print_row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
     };
     let mut world = build()?;
     let report = baked(&mut world, &request.options)?;
-    let errors = match points.is_empty() {
-        true => PointErrors::default(),
-        false => point_errors::measure(&mut world, &points),
-    };
+    let errors = (!points.is_empty()).then(|| point_errors::measure(&mut world, &points));
     let flip = match request.flip || request.pictures.is_some() {
         true => compared_views(name, &mut world, build, request)?,
         false => "-".to_owned(),
     };
+    let columns = errors.as_ref().map_or_else(|| vec!["-".to_owned(); 9], columns).join(" | ");
+    println!(
+        "| {name} | {} | {:.1} | {:.2} | {columns} | {flip} |",
+        report.texels,
+        report.seconds,
+        100.0 * report.estimated_error,
+    );
+    if request.stages {
+        println!();
+        if let Some(errors) = &errors {
+            println!("{errors}\n{}", errors.local);
+        }
+        println!("{report}");
+        if let Some(errors) = &errors {
+            print_worst(errors, &points);
+        }
+    }
+    Ok(())
+}
+
+/// The columns of a row that tell the errors at the points.
+fn columns(errors: &PointErrors) -> Vec<String> {
     let away = errors.local.away_from_edges;
     let percent = [
         away.to_point.median,
@@ -153,22 +172,10 @@ fn print_row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
         errors.bias,
     ]
     .map(|x| format!("{:.2}", 100.0 * x));
-    println!(
-        "| {name} | {} | {:.1} | {:.2} | {:.3}/{:.3} | {} | {} ({:.1e}) | {flip} |",
-        report.texels,
-        report.seconds,
-        100.0 * report.estimated_error,
-        errors.local.mean,
-        errors.local.outside,
-        percent.join(" | "),
-        errors.leaks.0,
-        errors.leaks.1
-    );
-    if request.stages {
-        println!("\n{errors}\n{}\n{report}", errors.local);
-        print_worst(&errors, &points);
-    }
-    Ok(())
+    let mut columns = vec![format!("{:.3}/{:.3}", errors.local.mean, errors.local.outside)];
+    columns.extend(percent);
+    columns.push(format!("{} ({:.1e})", errors.leaks.0, errors.leaks.1));
+    columns
 }
 
 /// Prints percentiles of the signed errors of the points in the region and away from shadow edges, relative to their

@@ -50,7 +50,7 @@ pub(crate) fn in_chunks_uncheckpointed<T: Send>(
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
     let mut values = Vec::with_capacity(count);
-    // They may take far longer than most values.
+    // Small at first, as a value may take far longer here than elsewhere.
     let mut size = MIN_SIZE;
     while values.len() < count {
         let begun = Instant::now();
@@ -62,7 +62,7 @@ pub(crate) fn in_chunks_uncheckpointed<T: Send>(
     Ok(values)
 }
 
-/// The number of values after a chunk of so many, which has just been computed.
+/// The size of the chunk after one of `size` values that was begun at `begun` and has just ended.
 fn next_size(size: usize, begun: Instant) -> usize {
     let on_time = size as f64 * CHUNK_SECONDS / begun.elapsed().as_secs_f64().max(1e-6);
     (on_time as usize).min(4 * size).clamp(MIN_SIZE, MAX_SIZE)

@@ -35,7 +35,8 @@ const LATE_TEST_RAYS: u32 = 2;
 /// Rays per point that classify it as open or hidden.
 const POINT_RAYS: u32 = 8;
 /// Rays from each corner and from the middle of what lies between contact lines. If all of them are clear, or all hit
-/// the inside of a solid, they decide for everything there.
+/// the inside of a solid, they decide for everything there. They never decide for a part that is so small that it has
+/// fewer of these points than make [`POINT_RAYS`] rays together.
 const AGREEING_RAYS: u32 = 2;
 /// Distance from a contact line, in texels, below which a point is classified by itself.
 const LINE_MARGIN: f64 = 0.05;
@@ -363,7 +364,7 @@ struct PointRays<'a> {
 }
 
 impl PointRays<'_> {
-    /// Casts one of the [`POINT_RAYS`] rays of a point, which is the receiver.
+    /// Casts one of the [`POINT_RAYS`] rays of a point; `receiver` is that point.
     fn met(&mut self, receiver: &Receiver, index: usize, ray: u32) -> Met {
         self.cast += 1;
         let [u, v, ..] = self.sequence.point(index as u32 * POINT_RAYS + ray, 0);
@@ -375,8 +376,11 @@ impl PointRays<'_> {
         }
     }
 
-    /// The view of some points whose first rays are all clear, or all hit the inside of a solid.
+    /// The view that some points have in common if their first rays are all clear, or all hit the inside of a solid.
     fn agreed_view(&mut self, tested: &[usize]) -> Option<PointView> {
+        if (tested.len() as u32) * AGREEING_RAYS < POINT_RAYS {
+            return None;
+        }
         let mut first = None;
         for &index in tested {
             let receiver = receiver(self.scene, &self.points[index]);
@@ -390,8 +394,8 @@ impl PointRays<'_> {
         Some(if first? == Met::Clear { PointView::Open } else { PointView::Hidden })
     }
 
-    /// The view of a point, by fewer than [`POINT_RAYS`] rays where the first ones decide. The point is hidden if half of
-    /// its rays hit the inside of a solid, or if too few are clear: none, or fewer than [`MIN_CLEAR`] where some are
+    /// The view of a point, by fewer than [`POINT_RAYS`] rays where the first ones decide. The point is hidden if half
+    /// of its rays hit the inside of a solid, or if too few are clear: none, or fewer than [`MIN_CLEAR`] where some are
     /// blocked.
     fn view(&mut self, index: usize) -> PointView {
         let receiver = receiver(self.scene, &self.points[index]);
@@ -417,6 +421,7 @@ impl PointRays<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::on_a_floor::on_a_floor;
     use super::*;
 
     /// The points of a footprint that fills its texel.
@@ -444,6 +449,22 @@ mod tests {
         assert_eq!(sizes(&[upright(0.4375)]), [24, 32]);
         assert_eq!(sizes(&[upright(0.25), level(0.5)]), [8, 8, 24, 24]);
         assert_eq!(sizes(&[[DVec2::splat(0.5); 2]]), [64], "a line without length divides nothing");
+    }
+
+    #[test]
+    fn two_rays_decide_for_points_that_are_enough_together() {
+        on_a_floor(8, |texels, _| {
+            let texel = &texels.list[9];
+            let points = fine_points(texels.scene, texel).unwrap();
+            let sequence = Sequence::new(SEED, Stream::HiddenView, texel.index.0);
+            let mut rays =
+                PointRays { scene: texels.scene, points: &points, sequence, clearance: 0.0, cast: 0 };
+            let tested = corners_and_middle(&points, &(0..points.len()).collect::<Vec<_>>());
+            assert_eq!((rays.agreed_view(&tested), rays.cast), (Some(PointView::Open), 10));
+            assert_eq!((rays.agreed_view(&tested[..3]), rays.cast), (None, 10));
+            rays.cast = 0;
+            assert_eq!((rays.view(tested[0]), rays.cast), (PointView::Open, 5));
+        });
     }
 
     #[test]

@@ -88,8 +88,8 @@ const ENOUGH_OF_THREE: f64 = 2.0;
 const BUDGET_SHARE_BESIDE_GATHER: f64 = 0.6;
 /// The share that direct light and the gather may leave together.
 const BOTH_SHARE: f64 = 0.85;
-/// Cost of the gather: its rays per texel times the share of the squared error that they leave. From 2 in a bright hall
-/// to 11 in a room behind a door and 18 in the demo level, at 2 %.
+/// Cost of the gather: its rays per texel times the share of the squared error that they leave. At a requested 2 % it is
+/// 2 in a bright hall, 11 in a room behind a door and some 18 in the demo level; this is near their geometric mean.
 const GATHER_COST: f64 = 8.0;
 
 /// The share of the requested squared error for direct light, whose shared sources need so many samples per texel to
@@ -105,6 +105,16 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+
+    #[test]
+    fn direct_light_has_more_of_the_error_the_more_samples_it_takes() {
+        let shares = [0.0, 8.0, 40.0, 200.0].map(share_beside_gather);
+        assert_eq!((shares[0], shares[3]), (MIN_SHARED_SHARE, MAX_SHARED_SHARE));
+        assert!(shares.is_sorted() && shares[1] > MIN_SHARED_SHARE && shares[2] < MAX_SHARED_SHARE);
+        // As costly as the gather: each has half of what both may leave.
+        let equal = share_beside_gather(GATHER_COST / MIN_SHARED_SHARE);
+        assert!((equal - 0.5 * BOTH_SHARE).abs() < 1e-12, "{equal}");
+    }
 
     #[test]
     fn only_a_time_limit_makes_direct_light_go_through_coarser_goals() {

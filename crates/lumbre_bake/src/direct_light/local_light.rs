@@ -20,11 +20,13 @@ use crate::sources::{Direct, Sources};
 use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 
-/// Walks from a block that has at least as many texels, the fewest from a smaller one, the same once the time is up, and
-/// the most steps of a walk.
+/// Walks from a block, unless it has fewer texels.
 const WALKS: u32 = 32;
+/// Walks from a block of few texels.
 const MIN_WALKS: u32 = 8;
+/// Walks from any block once the time is up.
 const LATE_WALKS: u32 = 4;
+/// The most steps of a walk.
 const BOUNCES: u32 = 6;
 /// Blocks in view that a walk notes.
 const VIEW: usize = 2;

@@ -28,16 +28,16 @@ const MIN_LIGHT: f64 = 2.0;
 const CELLS: u32 = 8;
 const LEAST_CELLS: u32 = 2;
 /// Where there are many such texels they have fewer cells, down to 2 x 2, so that cells take no more memory than a number
-/// per covered texel, and about as long as two shadow rays from each: no more than this many per covered texel.
+/// per covered texel, and about as long as two shadow rays from each at the default quality: no more than this many per covered texel.
 const CELLS_PER_TEXEL: usize = 1;
 /// The share of the time left in which cells may be computed, if it is limited. The texels after that have one value,
 /// as a complete map is more urgent.
 const TIME_SHARE: f64 = 0.1;
-/// Shadow rays to each lamp from a point of a cell, as a share of those from a texel in the first pass of direct light: one
-/// at the default quality. All rays that read a cell share its noise. In a cell alone it may be large; the mean over the
-/// texel is scaled to the texel's light, which has far less. The cells of a texel that a wall divides cannot be scaled, and
-/// have as many rays as a texel.
-const SAMPLES_SHARE: u32 = 8;
+/// So many times fewer shadow rays go to each lamp from a point of a cell than from a texel in the first pass of direct
+/// light: one at the default quality. All rays that read a cell share its noise. In a cell alone it may be large; the
+/// mean over the texel is scaled to the texel's light, which has far less. The cells of a texel that a wall divides
+/// cannot be scaled, and each of their points has as many rays as a texel.
+const FEWER_SAMPLES: u32 = 8;
 /// Cells whose mean is so many times the texel's light, or such a part of it, have missed what lights the texel.
 const MAX_SCALE: f32 = 4.0;
 
@@ -150,7 +150,7 @@ fn texel_cells(
     };
     let sequence = Sequence::new(options.seed, Stream::SteepLight, texel.index.0);
     let [of_texel, ..] = options.effort().direct;
-    let samples = if mean.is_some() { (of_texel / SAMPLES_SHARE).max(1) } else { of_texel };
+    let samples = if mean.is_some() { (of_texel / FEWER_SAMPLES).max(1) } else { of_texel };
     let (mut sums, mut counts) =
         (vec![Vec3::ZERO; (side * side) as usize], vec![0u32; (side * side) as usize]);
     let (mut total, mut rays) = (Vec3::ZERO, 0);

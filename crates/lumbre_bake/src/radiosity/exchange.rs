@@ -70,8 +70,7 @@ impl Exchange {
         let mut report = ExchangeReport::of(&transport);
         let Transport { patches, side, factors, halves } = transport;
         let open = factors.open.as_slice();
-        let (direct_halves, rays) =
-            direct_halves(sources, &patches, open, known_direct, options.seed, monitor)?;
+        let (direct_halves, rays) = direct_halves(sources, &patches, open, known_direct, options, monitor)?;
         let mut notes = StageNotes::of_rays(rays);
         let [even, odd] = &direct_halves;
         let direct: Vec<Vec3> = even.iter().zip(odd).map(|(even, odd)| 0.5 * (*even + *odd)).collect();

@@ -5,7 +5,6 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
-use crate::BakeError;
 use crate::chunks::in_chunks;
 use crate::coverage::{CoveredTexels, Footprint, Texel, barycentric};
 use crate::direct_light::DirectLight;
@@ -13,15 +12,20 @@ use crate::monitor::BakeMonitor;
 use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::{BakeScene, Receiver, Side};
 use crate::sources::Sources;
+use crate::{BakeError, BakeOptions, Quality};
 
 /// Fewest texels that a patch's light is computed from, in each half of them. The share of fewer texels that lies
 /// beyond the patch's border would be too large.
 const MIN_TEXELS: f64 = 2.0;
 
-/// Shadow rays to each source from a patch of mean area or more, for each of two halves.
+/// Shadow rays to each source from a patch, for each of two halves.
 const SHADOW_RAYS: u32 = 8;
-/// The fewest from a smaller one: the less it reflects into the scene, the less its noise matters.
-const MIN_SHADOW_RAYS: u32 = 2;
+/// The same from a smaller one, unless a reference is baked: the less it reflects into the scene, the less its noise
+/// matters. A power of two, as [`SHADOW_RAYS`].
+const SHADOW_RAYS_OF_SMALL: u32 = 4;
+/// A patch is small if it has less than this share of the mean area. Patches are cut to one side, so that only those of
+/// small triangles are smaller than most.
+const SMALL: f32 = 0.5;
 
 /// Mean direct irradiance of each patch, mixed lights included, by two halves of its texels, the fields of a
 /// chessboard. `None` where there are too few texels. Texels that walls divide are left out, since they hold the light
@@ -82,7 +86,7 @@ pub(super) fn direct_halves(
     patches: &Patches,
     open: &[f32],
     known: &[Option<[Vec3; 2]>],
-    seed: u32,
+    options: &BakeOptions,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<([Vec<Vec3>; 2], u64), BakeError> {
     let mut halves = [Vec::new(), Vec::new()];
@@ -96,19 +100,16 @@ pub(super) fn direct_halves(
                 _ => {}
             }
             let index = PatchIndex::new(place);
-            let sequence = Sequence::new(seed, Stream::PatchLight(number), index.0);
-            let shadow_rays = shadow_rays(patches.list[place].area / mean_area);
+            let sequence = Sequence::new(options.seed, Stream::PatchLight(number), index.0);
+            let is_small =
+                patches.list[place].area < SMALL * mean_area && options.quality != Quality::Reference;
+            let shadow_rays = if is_small { SHADOW_RAYS_OF_SMALL } else { SHADOW_RAYS };
             patch_direct(sources, patches, index, open[place], shadow_rays, sequence)
         })?;
         rays += results.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
         *half = results.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
     }
     Ok((halves, rays))
-}
-
-/// Shadow rays to each source from a patch of so many times the mean area.
-fn shadow_rays(relative_area: f32) -> u32 {
-    ((relative_area * SHADOW_RAYS as f32) as u32).clamp(MIN_SHADOW_RAYS, SHADOW_RAYS)
 }
 
 /// Direct irradiance of a patch by so many shadow rays to each source, and the rays that it took in all. `open` is the

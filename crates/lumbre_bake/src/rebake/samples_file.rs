@@ -102,10 +102,16 @@ impl Samples {
 }
 
 /// Samples as their file holds them, from [`Samples::packed`].
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct PackedSamples {
     checksum: blake3::Hash,
     content: Vec<u8>,
+}
+
+impl std::fmt::Debug for PackedSamples {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PackedSamples").field("bytes", &self.content.len()).finish_non_exhaustive()
+    }
 }
 
 impl PackedSamples {

@@ -427,7 +427,7 @@ impl FlatMoments {
         let gradient = slope * (inverse * inverse) - towards * (4.0 * value * inverse);
         let of_normals = symmetric_products(normal, axis).map(|product| -product * inverse * inverse);
         let of_slopes = symmetric_products(slope, towards).map(|product| -4.0 * product * inverse.powi(3));
-        // Both of its products are the same.
+        // The symmetric products of a vector with itself are twice its squares: hence 12 and not 24.
         let of_offsets =
             symmetric_products(towards, towards).map(|product| 12.0 * value * inverse * inverse * product);
         let diagonal = -4.0 * value * inverse;

@@ -7,7 +7,7 @@ use super::path_tracer::Irradiance;
 
 /// A lower bound on the irradiance by which the error at a point is divided, in units of the region's mean irradiance.
 const FLOOR: f64 = 0.01;
-/// The same by which a bake's stated errors are divided, the lower bound of its local light.
+/// A higher bound: a sixteenth, as for the baker's local light, but of the region's mean instead of the level's.
 const FLOOR_OF_LOCAL_LIGHT: f64 = 1.0 / 16.0;
 
 /// Statistics of relative errors. The error at a point is the root mean square of its channels over an irradiance.
@@ -28,7 +28,7 @@ pub struct SubsetErrors {
     pub points: usize,
     /// Relative to the point's own irradiance.
     pub to_point: RelativeErrors,
-    /// The same, with the lower bound of a bake's local light: in gaps of a millimetre there is next to none.
+    /// The same, but at least to [`FLOOR_OF_LOCAL_LIGHT`] of the mean: gaps of a millimetre have next to no light.
     pub to_point_or_floor: RelativeErrors,
     /// Relative to the logarithmic average of the region's irradiance.
     pub to_log_average: RelativeErrors,

@@ -32,8 +32,8 @@ const HALF_A_TEXEL: f64 = 0.25;
 const MAX_CHANGE: f64 = 2.0;
 /// Variance of a texel beside a chart, which shows no surface of its own, relative to that of its neighbours.
 const BESIDE_CHART: f64 = 4.0;
-/// Residual at which conjugate gradients stop, relative to that before any change, and the most steps they take. What is
-/// left of a jump is far less than the half floats of a map can show.
+/// Residual at which conjugate gradients stop, and the most steps they take. It is relative to that before any change,
+/// so that those that follow, without the texels that have reached their limit, do not polish what is solved already.
 const RESIDUAL: f64 = 1e-4;
 const MAX_STEPS: usize = 400;
 /// How many times the system is solved, each time without the texels that have reached their limit.
@@ -266,7 +266,8 @@ impl<'a> Channel<'a> {
     /// again.
     fn solve(&self, patience: Patience) -> Vec<f64> {
         let count = self.stiffness.len();
-        let mut held = vec![false; count];
+        // Texels without any error may not move, and would only add to the residual.
+        let mut held: Vec<bool> = self.bounds.iter().map(|[low, high]| low == high).collect();
         let mut changes = vec![0.0; count];
         let residual = self.residual(&held, &changes);
         let energy: f64 = residual.iter().zip(&self.preconditioner).map(|(r, p)| r * (r * p)).sum();

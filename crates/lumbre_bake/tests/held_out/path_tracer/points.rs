@@ -76,7 +76,7 @@ impl PathTracer {
     }
 
     /// Whether another face touches this point and faces it.
-    fn touches(&self, position: DVec3, normal: DVec3) -> bool {
+    pub fn touches(&self, position: DVec3, normal: DVec3) -> bool {
         let [low, high] = self.scene.bounds();
         let gap = TOUCHING * (high - low).length();
         let (mut origin, mut remaining) = (position - normal * gap, 2.0 * gap);
