@@ -27,8 +27,9 @@ const MIN_LIGHT: f64 = 2.0;
 /// Cells along a texel's side, at most and at least.
 const CELLS: u32 = 8;
 const LEAST_CELLS: u32 = 2;
-/// Where there are many such texels they have fewer cells, down to 2 x 2, so that cells take no more memory than a number
-/// per covered texel, and about as long as two shadow rays from each at the default quality: no more than this many per covered texel.
+/// Where there are many such texels they have fewer cells, down to 2 x 2: no more than this many per covered texel. So
+/// cells take no more memory than a number per covered texel and, at the default quality, about as long as two shadow
+/// rays from each.
 const CELLS_PER_TEXEL: usize = 1;
 /// The share of the time left in which cells may be computed, if it is limited. The texels after that have one value,
 /// as a complete map is more urgent.
@@ -276,6 +277,30 @@ mod tests {
             }
             for mean in [Vec3::ZERO, 0.1 * unscaled, 10.0 * unscaled, Vec3::NAN] {
                 assert!(cells(Some(mean)).light.iter().all(|light| light.is_nan()), "{mean}");
+            }
+        });
+    }
+
+    /// Half of the texel is inside of something: nothing is known there, and the other half has its own light.
+    #[test]
+    fn cells_without_a_point_in_the_open_are_unknown() {
+        on_a_floor(8, |texels, _| {
+            let whole = &texels.list[2 * 8 + 5];
+            let emitter = lamp_above(texels, whole);
+            let sources = Sources::new(texels.scene, vec![emitter], Vec::new(), Vec3::ZERO);
+            let options = BakeOptions::default();
+            let middles = (0..CELLS * CELLS).map(|cell| [cell % CELLS, cell / CELLS]);
+            let middles = middles.map(|cell| cell.map(|place| (place as f32 + 0.5) / CELLS as f32));
+            let points = middles.filter(|[x, _]| *x < 0.5);
+            let points = points.map(|[x, y]| whole.covered_point(texels.scene, x, y).unwrap()).collect();
+            let half = Texel { footprint: Footprint::Points(points), ..whole.clone() };
+            let of_whole = texel_cells(&sources, whole, CELLS, None, &options).light;
+            let of_half = texel_cells(&sources, &half, CELLS, None, &options).light;
+            for (cell, (light, expected)) in of_half.iter().zip(&of_whole).enumerate() {
+                match cell as u32 % CELLS < CELLS / 2 {
+                    true => assert!(light.distance(*expected) < 1e-5 * expected.length(), "{cell}: {light}"),
+                    false => assert!(light.is_nan(), "{cell}: {light}"),
+                }
             }
         });
     }

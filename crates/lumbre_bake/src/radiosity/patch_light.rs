@@ -113,7 +113,8 @@ pub(super) fn direct_halves(
 }
 
 /// Direct irradiance of a patch by so many shadow rays to each source, and the rays that it took in all. `open` is the
-/// share of the patch that is not inside other geometry: the part inside receives nothing, so that the mean over the whole patch is divided by that share.
+/// share of the patch that is not inside other geometry: the part inside receives nothing, so that the mean over the
+/// whole patch is divided by that share.
 pub(crate) fn patch_direct(
     sources: &Sources<'_>,
     patches: &Patches,
