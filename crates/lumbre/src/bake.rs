@@ -66,9 +66,8 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     let packing = samples
         .filter(|_| !asked.no_reuse)
         .map(|samples| std::thread::Builder::new().name("samples".into()).spawn(move || samples.packed()));
-    let saved = save_baked(&mut world, &source, &asked.output, &files);
-    let saved =
-        saved.with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
+    let saved = save_baked(&mut world, &source, &asked.output, &files)
+        .with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
     for note in saved.notes {
         eprintln!("lumbre: note: {}: {note}", asked.output.display());
     }

@@ -143,7 +143,7 @@ fn suspicious_tile(scene: &BakeScene, members: &[&Texel], is_crossed: &[bool]) -
         return (true, 0);
     };
     let tested = (0..rays).map(|ray| members[ray * members.len() / rays]);
-    let is_clear = |(ray, texel): (usize, &Texel)| test_ray(scene, texel, ray as u32) == TestRay::Clear;
+    let is_clear = |(ray, texel): (usize, &Texel)| test_ray(scene, texel, ray as u32) == RayEnd::Clear;
     (!tested.enumerate().all(is_clear), rays as u32)
 }
 
@@ -165,39 +165,47 @@ fn is_free_tile(scene: &BakeScene, members: &[&Texel]) -> bool {
     area.is_some_and(|area| is_free_before(&area, scene))
 }
 
-/// The outcome of a ray from a texel.
+/// What a ray from a point hits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum TestRay {
-    Clear,
-    /// It hits a lit surface almost at once.
+enum RayEnd {
+    /// The inside of a solid, as also a ray that leaves a scene which is dark outside.
+    Inside,
+    /// A back face.
+    Back,
+    /// A lit surface almost at once.
     Blocked,
-    /// It hits the inside of a solid or a back face, or leaves a scene that is dark outside.
-    Hidden,
+    /// A lit surface farther away, or nothing.
+    Clear,
 }
 
-fn test_ray(scene: &BakeScene, texel: &Texel, ray: u32) -> TestRay {
-    let [x, y, u, v] = Sequence::new(SEED, Stream::HiddenTexel, texel.index.0).point(ray, 0);
-    let Some(point) = texel.point(scene, x, y) else { return TestRay::Clear };
-    let receiver = receiver(scene, &point);
-    let direction = cosine_about(receiver.geometric_normal, u, v);
-    match scene.classify_hit(receiver.origin, direction) {
-        SurfaceHit::Inside | SurfaceHit::Back => TestRay::Hidden,
-        SurfaceHit::Lit { distance, .. } if distance < min_clearance(scene, texel) => TestRay::Blocked,
-        SurfaceHit::Lit { .. } | SurfaceHit::None => TestRay::Clear,
+/// Casts a ray from a point, given two random numbers; it is blocked if it is shorter than `clearance`.
+fn ray_end(scene: &BakeScene, from: &Receiver, [u, v]: [f32; 2], clearance: f32) -> RayEnd {
+    match scene.classify_hit(from.origin, cosine_about(from.geometric_normal, u, v)) {
+        SurfaceHit::Inside => RayEnd::Inside,
+        SurfaceHit::Back => RayEnd::Back,
+        SurfaceHit::Lit { distance, .. } if distance < clearance => RayEnd::Blocked,
+        SurfaceHit::Lit { .. } | SurfaceHit::None => RayEnd::Clear,
     }
+}
+
+/// A ray from a random point of a texel.
+fn test_ray(scene: &BakeScene, texel: &Texel, ray: u32) -> RayEnd {
+    let [x, y, u, v] = Sequence::new(SEED, Stream::HiddenTexel, texel.index.0).point(ray, 0);
+    let Some(point) = texel.point(scene, x, y) else { return RayEnd::Clear };
+    ray_end(scene, &receiver(scene, &point), [u, v], min_clearance(scene, texel))
 }
 
 /// Whether some ray of a texel suggests that part of it is hidden.
 fn is_suspicious(scene: &BakeScene, texel: &Texel, rays: u32) -> bool {
     let mut blocked = 0;
     (0..rays).any(|ray| match test_ray(scene, texel, ray) {
-        TestRay::Hidden => true,
+        RayEnd::Inside | RayEnd::Back => true,
         // In any corner of a room one ray may be blocked.
-        TestRay::Blocked => {
+        RayEnd::Blocked => {
             blocked += 1;
             blocked > 1
         }
-        TestRay::Clear => false,
+        RayEnd::Clear => false,
     })
 }
 
@@ -291,7 +299,7 @@ fn between_lines(points: &[FootprintPoint], lines: impl Iterator<Item = [DVec2; 
 
 /// Classifies all points of a texel alike: as open if at least half of its test rays are clear.
 fn classify_roughly(scene: &BakeScene, texel: &Texel) -> OpenPoints {
-    let clear = (0..TEST_RAYS).filter(|&ray| test_ray(scene, texel, ray) == TestRay::Clear).count();
+    let clear = (0..TEST_RAYS).filter(|&ray| test_ray(scene, texel, ray) == RayEnd::Clear).count();
     let open = if 2 * clear >= TEST_RAYS as usize { Vec::new() } else { vec![0] };
     OpenPoints { open, rays: TEST_RAYS }
 }
@@ -339,19 +347,6 @@ enum PointView {
     BackFaces,
 }
 
-/// What a ray from a point meets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Met {
-    /// The inside of a solid.
-    Inside,
-    /// A back face.
-    Back,
-    /// A lit surface almost at once.
-    Blocked,
-    /// Anything else, or nothing.
-    Clear,
-}
-
 /// The rays from a texel's points: those of a point are always the same.
 struct PointRays<'a> {
     scene: &'a BakeScene,
@@ -364,16 +359,11 @@ struct PointRays<'a> {
 }
 
 impl PointRays<'_> {
-    /// Casts one of the [`POINT_RAYS`] rays of a point; `receiver` is that point.
-    fn met(&mut self, receiver: &Receiver, index: usize, ray: u32) -> Met {
+    /// Casts one of the [`POINT_RAYS`] rays of a point; `from` is that point.
+    fn ray(&mut self, from: &Receiver, index: usize, ray: u32) -> RayEnd {
         self.cast += 1;
         let [u, v, ..] = self.sequence.point(index as u32 * POINT_RAYS + ray, 0);
-        match self.scene.classify_hit(receiver.origin, cosine_about(receiver.geometric_normal, u, v)) {
-            SurfaceHit::Inside => Met::Inside,
-            SurfaceHit::Back => Met::Back,
-            SurfaceHit::Lit { distance, .. } if distance < self.clearance => Met::Blocked,
-            SurfaceHit::Lit { .. } | SurfaceHit::None => Met::Clear,
-        }
+        ray_end(self.scene, from, [u, v], self.clearance)
     }
 
     /// The view that some points have in common if their first rays are all clear, or all hit the inside of a solid.
@@ -385,13 +375,13 @@ impl PointRays<'_> {
         for &index in tested {
             let receiver = receiver(self.scene, &self.points[index]);
             for ray in 0..AGREEING_RAYS {
-                let met = self.met(&receiver, index, ray);
-                if met != *first.get_or_insert(met) || matches!(met, Met::Back | Met::Blocked) {
+                let end = self.ray(&receiver, index, ray);
+                if end != *first.get_or_insert(end) || matches!(end, RayEnd::Back | RayEnd::Blocked) {
                     return None;
                 }
             }
         }
-        Some(if first? == Met::Clear { PointView::Open } else { PointView::Hidden })
+        Some(if first? == RayEnd::Clear { PointView::Open } else { PointView::Hidden })
     }
 
     /// The view of a point, by fewer than [`POINT_RAYS`] rays where the first ones decide. The point is hidden if half
@@ -401,11 +391,11 @@ impl PointRays<'_> {
         let receiver = receiver(self.scene, &self.points[index]);
         let (mut inside, mut blocked, mut clear) = (0, 0, 0);
         for ray in 0..POINT_RAYS {
-            match self.met(&receiver, index, ray) {
-                Met::Inside => inside += 1,
-                Met::Back => {}
-                Met::Blocked => blocked += 1,
-                Met::Clear => clear += 1,
+            match self.ray(&receiver, index, ray) {
+                RayEnd::Inside => inside += 1,
+                RayEnd::Back => {}
+                RayEnd::Blocked => blocked += 1,
+                RayEnd::Clear => clear += 1,
             }
             if 2 * inside >= POINT_RAYS {
                 return PointView::Hidden;

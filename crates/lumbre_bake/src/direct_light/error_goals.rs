@@ -89,7 +89,7 @@ const BUDGET_SHARE_BESIDE_GATHER: f64 = 0.6;
 /// The share that direct light and the gather may leave together.
 const BOTH_SHARE: f64 = 0.85;
 /// Cost of the gather: its rays per texel times the share of the squared error that they leave. At a requested 2 % it is
-/// 2 in a bright hall, 11 in a room behind a door and some 18 in the demo level; this is near their geometric mean.
+/// 2 in a bright hall, 4 under many lamps, and 10 to 11 in a room behind a door and in the demo level.
 const GATHER_COST: f64 = 8.0;
 
 /// The share of the requested squared error for direct light, whose shared sources need so many samples per texel to

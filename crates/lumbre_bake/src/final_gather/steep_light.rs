@@ -205,8 +205,8 @@ mod tests {
     use crate::scene::Side;
     use crate::sources::Emitter;
 
-    /// A small lamp close above the middle of a texel, facing it.
-    fn lamp_above(texels: &CoveredTexels<'_>, texel: &Texel) -> Emitter {
+    /// A small lamp close above the middle of a texel, facing it, and nothing else that shines.
+    fn lamp_above<'a>(texels: &CoveredTexels<'a>, texel: &Texel) -> Sources<'a> {
         let at = receiver(texels.scene, &texel.point(texels.scene, 0.5, 0.5).unwrap());
         let side = texel.side(texels.scene);
         let corner = |x: f32, z: f32| at.position + side * (0.2 * at.normal + 0.1 * Vec3::new(x, 0.0, z));
@@ -214,7 +214,7 @@ mod tests {
         let product = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let corners =
             if product.dot(at.normal) < 0.0 { corners } else { [corners[0], corners[2], corners[1]] };
-        Emitter {
+        let lamp = Emitter {
             corners,
             corners_f64: corners.map(|corner| corner.as_dvec3()),
             normal: -at.normal,
@@ -222,7 +222,8 @@ mod tests {
             radiance: Vec3::new(1.0, 2.0, 0.0),
             triangle: 0,
             side: Side::Front,
-        }
+        };
+        Sources::new(texels.scene, vec![lamp], Vec::new(), Vec3::ZERO)
     }
 
     /// A texel on one triangle, and one that two share.
@@ -230,8 +231,7 @@ mod tests {
     fn cells_have_the_light_of_their_middles() {
         on_a_floor(8, |texels, _| {
             for texel in [&texels.list[2 * 8 + 5], &texels.list[4 * 8 + 4]] {
-                let emitter = lamp_above(texels, texel);
-                let sources = Sources::new(texels.scene, vec![emitter], Vec::new(), Vec3::ZERO);
+                let sources = lamp_above(texels, texel);
                 let options = BakeOptions::default();
                 let TexelCells { light, rays } = texel_cells(&sources, texel, CELLS, None, &options);
                 assert_eq!(rays, options.effort().direct[0] * CELLS * CELLS);
@@ -262,8 +262,7 @@ mod tests {
     fn the_mean_over_the_cells_is_the_light_of_the_texel_unless_they_have_missed_it() {
         on_a_floor(8, |texels, _| {
             let texel = &texels.list[2 * 8 + 5];
-            let emitter = lamp_above(texels, texel);
-            let sources = Sources::new(texels.scene, vec![emitter], Vec::new(), Vec3::ZERO);
+            let sources = lamp_above(texels, texel);
             let mean_of = |cells: &TexelCells| cells.light.iter().sum::<Vec3>() / cells.light.len() as f32;
             let options = BakeOptions::default();
             let cells = |mean: Option<Vec3>| texel_cells(&sources, texel, CELLS, mean, &options);
@@ -286,8 +285,7 @@ mod tests {
     fn cells_without_a_point_in_the_open_are_unknown() {
         on_a_floor(8, |texels, _| {
             let whole = &texels.list[2 * 8 + 5];
-            let emitter = lamp_above(texels, whole);
-            let sources = Sources::new(texels.scene, vec![emitter], Vec::new(), Vec3::ZERO);
+            let sources = lamp_above(texels, whole);
             let options = BakeOptions::default();
             let middles = (0..CELLS * CELLS).map(|cell| [cell % CELLS, cell / CELLS]);
             let middles = middles.map(|cell| cell.map(|place| (place as f32 + 0.5) / CELLS as f32));

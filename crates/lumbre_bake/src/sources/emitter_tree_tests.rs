@@ -105,7 +105,7 @@ fn distant_parts_of_a_flat_lamp_are_close_to_the_exact_sum() {
     let tree = EmitterTree::new(&emitters, &vec![0; emitters.len()]);
     let receivers = receivers(Vec3::new(-2.0, 0.0, -2.0), Vec3::new(2.0, 0.98, 2.0), 0.5);
     let [worst, rms] = errors(&tree, &emitters, &receivers);
-    // (r/d)³ = 0.0034.
+    // (r/d)³ = 0.0034 where a node is just small enough; most are farther away, and 0.02 % was measured.
     assert!(worst < 0.0034 && rms < 0.1 * f64::from(TERM_ERROR), "{worst} {rms}");
 }
 

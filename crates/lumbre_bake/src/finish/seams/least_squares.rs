@@ -269,11 +269,13 @@ impl<'a> Channel<'a> {
         // Texels without any error may not move, and would only add to the residual.
         let mut held: Vec<bool> = self.bounds.iter().map(|[low, high]| low == high).collect();
         let mut changes = vec![0.0; count];
-        let residual = self.residual(&held, &changes);
-        let energy: f64 = residual.iter().zip(&self.preconditioner).map(|(r, p)| r * (r * p)).sum();
-        let small_energy = RESIDUAL * RESIDUAL * energy;
+        let mut small_energy = None;
         for _ in 0..patience.active_sets {
-            self.solve_free(&held, &mut changes, patience.steps, small_energy);
+            let residual = self.residual(&held, &changes);
+            let small_energy =
+                *small_energy.get_or_insert_with(|| RESIDUAL * RESIDUAL * self.energy(&residual));
+            let free = Free { channel: self, held: &held, most_steps: patience.steps, small_energy };
+            conjugate_gradients::solve(&free, &mut changes, residual);
             let mut any_clamped = false;
             for ((change, [low, high]), held) in changes.iter_mut().zip(&self.bounds).zip(&mut held) {
                 let within = change.clamp(*low, *high);
@@ -288,22 +290,17 @@ impl<'a> Channel<'a> {
         changes
     }
 
-    /// Solves for the changes that are not held, starting from their current values.
-    fn solve_free(&self, held: &[bool], changes: &mut [f64], most_steps: usize, small_energy: f64) {
-        let residual = self.residual(held, changes);
-        conjugate_gradients::solve(
-            &Free { channel: self, held, most_steps, small_energy },
-            changes,
-            residual,
-        );
-    }
-
     /// What the changes that are not held leave of the system.
     fn residual(&self, held: &[bool], changes: &[f64]) -> Vec<f64> {
         let gradient = self.gradient(changes, Some(&self.jumps));
         let mut residual: Vec<f64> = gradient.into_iter().map(|value| -value).collect();
         zero_held(held, &mut residual);
         residual
+    }
+
+    /// The dot product of a residual and the preconditioned residual.
+    fn energy(&self, residual: &[f64]) -> f64 {
+        residual.iter().zip(&self.preconditioner).map(|(r, p)| r * (r * p)).sum()
     }
 
     /// The system's matrix times the changes `x`; with the jumps before any change, half the gradient of what is
