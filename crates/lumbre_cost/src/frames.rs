@@ -338,7 +338,6 @@ mod tests {
 
     use super::*;
     use crate::converged::ConvergedBakes;
-    use crate::findings::{factor, ratio_of};
     use crate::scenes::{
         Air, BallsAndLamps, assorted_balls, balls_and_lamps, every_effect, fence, mirror_and_glass, room,
     };
@@ -443,92 +442,6 @@ mod tests {
             let pictured = drawn(None, as_shown)?.into_iter().map(|one| !one.picture.radiance.is_empty());
             assert_eq!(pictured.collect::<Vec<_>>(), [true, true, true, false]);
         }
-        Ok(())
-    }
-
-    /// Frames as `lumbre render --timings` draws and times them: measured, by the program's own clock, until the device
-    /// has finished.
-    fn frame_by_timings(
-        renderer: &mut Renderer,
-        world: &mut World,
-        target: &FrameTarget,
-        options: &FrameOptions,
-    ) -> Result<f64, CostError> {
-        let options = FrameOptions { measure: Measure::Time, ..options.clone() };
-        let begun = Instant::now();
-        renderer.render(world, target, &options)?;
-        renderer.wait()?;
-        Ok(milliseconds_since(begun))
-    }
-
-    /// Pairs of frames, one timed by a study and one by `--timings`, and how many times as long the former took.
-    const PAIRS: usize = 31;
-
-    /// The same frame of the same scene, drawn warm in turns by two renderers, so that other load on the machine,
-    /// and how the operating system spreads the threads of the process over its cores, affect both alike. Returns
-    /// the ratio of the study's time to that of `--timings`. `slowed` is how often the study draws where it should
-    /// draw once.
-    fn ratio_to_timings(
-        world: &mut World,
-        options: &FrameOptions,
-        slowed: usize,
-    ) -> Result<Spread, CostError> {
-        let gpu = Gpu::headless()?;
-        let target = Offscreen::new(&gpu, 480, 270, OffscreenFormat::Rgba8)?;
-        let target = target.target();
-        update_transforms(world);
-        let (mut of_study, mut of_timings) = (Renderer::new(&gpu), Renderer::new(&gpu));
-        let (mut study, mut timings) = (Vec::new(), Vec::new());
-        const COLD: usize = 3;
-        for number in 0..COLD + PAIRS {
-            let mut by_timings =
-                |world: &mut World| frame_by_timings(&mut of_timings, world, &target, options);
-            let mut by_study = |world: &mut World| -> Result<f64, CostError> {
-                let frames = (0..slowed).map(|_| timed_frame(&mut of_study, world, &target, options));
-                frames.sum()
-            };
-            let pair = match number % 2 {
-                0 => {
-                    let first = by_study(world)?;
-                    (first, by_timings(world)?)
-                }
-                _ => {
-                    let first = by_timings(world)?;
-                    (by_study(world)?, first)
-                }
-            };
-            if number >= COLD {
-                study.push(pair.0);
-                timings.push(pair.1);
-            }
-        }
-        Ok(ratio_of(&study, &timings).unwrap_or_else(|| panic!("there are {PAIRS} pairs")))
-    }
-
-    #[test]
-    #[ignore = "measures times: run it alone on a quiet machine"]
-    fn a_studys_time_is_that_of_the_timings_within_a_tenth() -> Result<(), CostError> {
-        let phong = FrameOptions::default();
-        let samples = FrameOptions { multisample: Some(true), ..phong.clone() };
-        // Measuring itself takes 0.2 ms, which is more than a tenth of the shortest frames: this one takes 2.5 ms with
-        // one sample a pixel, and then 0.91 of the time by --timings.
-        let gouraud = FrameOptions { shading: Some(Shading::Gouraud), ..samples.clone() };
-        let scenes: [(&str, World, &FrameOptions); 6] = [
-            ("room", room(Air::Clear), &phong),
-            ("room, Gouraud, four samples", room(Air::Clear), &gouraud),
-            ("room, four samples", room(Air::Clear), &samples),
-            ("fence with shadows", fence(), &phong),
-            ("mirror and glass", mirror_and_glass(), &phong),
-            ("assorted balls", assorted_balls(), &phong),
-        ];
-        for (name, mut world, options) in scenes {
-            let ratio = ratio_to_timings(&mut world, options, 1)?;
-            println!("{name}: {} of the time by --timings", factor(&ratio));
-            assert!((0.9..=1.1).contains(&ratio.median), "{name}: {ratio:?}");
-        }
-        // Negative control: a study that drew each frame twice would be found.
-        let twice = ratio_to_timings(&mut room(Air::Clear), &phong, 2)?;
-        assert!(twice.lower > 1.3, "{twice:?}");
         Ok(())
     }
 }

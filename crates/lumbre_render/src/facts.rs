@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use lumbre_scene::{Census, ObjectCensus, SceneSettings};
+use lumbre_scene::{Census, ObjectCensus, RefractiveShape, SceneSettings};
 
 use crate::FrameOptions;
 use crate::extract::LightSet;
@@ -37,6 +37,8 @@ pub struct SceneFacts {
     pub(crate) path: ChosenPath,
     /// Whether the refracted light of surfaces with many triangles is added pixel by pixel.
     pub(crate) refracts_by_pixel: bool,
+    /// The shapes of the objects through which what lies behind them is drawn.
+    pub(crate) refractive_shapes: Vec<RefractiveShape>,
     /// The contents of the G-buffer, if the frame is shaded deferred.
     pub(crate) g_buffer: Option<GBufferContents>,
     /// The scene's settings: ambient light, fog, background, rates of evaluation.
@@ -59,6 +61,8 @@ impl SceneFacts {
             false => (0, 0),
         };
         let lightmapped = objects.lightmapped - objects.lightmapped_blended - lightmapped_refractive;
+        let shapes = RefractiveShape::ALL.into_iter().zip(objects.refractive_shapes);
+        let shapes = shapes.filter(|(_, count)| options.refraction && *count > 0);
         let samples = if options.multisample.or(settings.frame.multisample) == Some(true) { 4 } else { 1 };
         let path = ChosenPath::new((options, settings), lights, objects, (samples, software, size));
         let details = lightmapped > 0 || objects.textured > 0 || objects.vertex_colors > 0;
@@ -74,6 +78,7 @@ impl SceneFacts {
             samples,
             path,
             refracts_by_pixel: rendering_path::refracts_by_pixel(options, objects, (samples, software)),
+            refractive_shapes: shapes.map(|(shape, _)| shape).collect(),
             g_buffer: path.is_deferred().then_some(GBufferContents { details }),
             settings: *settings,
         }

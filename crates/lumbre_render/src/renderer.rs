@@ -8,7 +8,7 @@ use std::time::Instant;
 use bevy_ecs::prelude::*;
 use lumbre_graph::{Executor, Plan};
 use lumbre_optics::{ErrorBound, Shading};
-use lumbre_scene::{SceneSettings, ShadowFilter, propagate_transforms};
+use lumbre_scene::{RefractiveShape, SceneSettings, ShadowFilter, propagate_transforms};
 
 use crate::accounting::FrameShares;
 use crate::cluster_grid::ClusteredView;
@@ -805,10 +805,10 @@ impl Renderer {
             let object = self.objects.get(slot)?;
             let refractor = object.refractor.as_ref()?;
             let flat = object.planar_mirror.is_some();
-            let data = RefractorData::new(refractor, (object.radius, flat), parallel, background);
+            let data = RefractorData::new(refractor, object.radius, parallel, background);
             Some(RefractorSurface {
                 slot,
-                thin: refractor.thin,
+                shape: RefractiveShape::new(refractor.thin, flat),
                 mirrored: object.mirrored,
                 triangles: object.triangles,
                 window: view.window_of_box(object.center, object.half_size).unwrap_or(view.window),

@@ -61,7 +61,7 @@ pub use bevy_ecs::name::Name;
 pub use bounds::scene_bounds;
 pub use census::{
     Census, CensusLine, LightCensus, Mobility, ObjectCensus, ObjectComponents, ObjectItem, ObjectTraits,
-    light_place, planar_mirror, shines, shown_objects,
+    RefractiveShape, light_place, planar_mirror, shines, shown_objects,
 };
 pub use components::{
     ActiveCamera, Bounds, Camera, DynamicObject, EmissiveLight, Extras, Hidden, Lightmap, LightmapScale,

@@ -58,6 +58,24 @@ fn draco_meshes_are_what_the_reference_decoder_finds() {
     }
 }
 
+#[test]
+fn attributes_that_share_an_accessor_have_their_own_draco_data() {
+    let _alone = MEASURING.lock();
+    let (name, bytes, expected) = MESHES[0];
+    let expected: Value = serde_json::from_slice(expected).unwrap();
+    let (mut alone, _) = compressed_mesh(bytes, &expected).load().unwrap();
+    let alone = the_mesh(&mut alone);
+    assert!(alone.normals != alone.positions);
+    // As a program that removes duplicates leaves them: both are three floats for each of as many vertices.
+    let mut file = compressed_mesh(bytes, &expected);
+    let attributes = &mut file.root["meshes"][0]["primitives"][0]["attributes"];
+    attributes["NORMAL"] = attributes["POSITION"].clone();
+    let (mut shared, _) = file.load().unwrap();
+    let shared = the_mesh(&mut shared);
+    assert_eq!((&shared.positions, &shared.normals), (&alone.positions, &alone.normals), "{name}");
+    assert_eq!((&shared.uv0, &shared.indices), (&alone.uv0, &alone.indices), "{name}");
+}
+
 fn the_picture(world: &mut World) -> std::sync::Arc<Image> {
     world.query::<&MaterialTextures>().single(world).unwrap().base_color.clone().unwrap().image
 }

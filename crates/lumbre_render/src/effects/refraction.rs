@@ -14,7 +14,7 @@
 //! Light is added triangle by triangle, or, of surfaces with many triangles, pixel by pixel (`rendering_path` chooses):
 //! then their visible front faces are drawn first, and each surface's light is added over its part of the frame.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use bevy_ecs::world::World;
 use glam::Vec3;
@@ -22,6 +22,7 @@ use lumbre_graph::{
     LoadOp, PassResources, RasterContext, RunError, TextureDescriptor, TextureHandle, TextureRead,
     TextureWrite, TransferContext,
 };
+use lumbre_scene::RefractiveShape;
 
 use super::mirrors::MirrorPictures;
 use super::surface_uniforms::SurfaceUniforms;
@@ -31,7 +32,7 @@ use crate::extract::{LitPass, RefractorData, RefractorSurface};
 use crate::facts::SceneFacts;
 use crate::features::{fog_feature, fog_flags};
 use crate::frame_bindings::FrameBuffer;
-use crate::frame_plan::FrameShape;
+use crate::frame_plan::{FrameShape, MirrorShape};
 use crate::frame_scene::{FrameScene, SHAPE};
 use crate::pending::Pending;
 use crate::rendering_path::MANY_REFRACTIVE_TRIANGLES;
@@ -54,11 +55,22 @@ pub(super) struct Refraction {
     /// Whether the light of surfaces with many triangles is added pixel by pixel.
     by_pixel: bool,
     fog: Option<Feature>,
+    /// The shapes of the scene's transmissive meshes, and whether reflections in flat ones have pictures.
+    shapes: Vec<RefractiveShape>,
+    has_mirrors: bool,
     /// The surfaces in view.
     surfaces: Vec<RefractorSurface>,
-    /// The pipelines of this frame, once it is decided.
-    keys: Option<Keys>,
+    /// What the pipelines of this frame depend on, once it is decided.
+    target: Option<LitTarget>,
     device: Option<OnDevice>,
+}
+
+/// What all pipelines that add light to a frame depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct LitTarget {
+    format: wgpu::TextureFormat,
+    samples: u32,
+    fog: Option<Feature>,
 }
 
 /// What a pipeline depends on.
@@ -68,35 +80,9 @@ enum Key {
     BackFaces { mirrored: bool },
     /// Draws the visible front faces.
     FrontFaces,
-    /// Adds the refracted and reflected light, triangle by triangle or where front faces have been drawn.
-    Surfaces { format: wgpu::TextureFormat, samples: u32, fog: Option<Feature>, from_front_faces: bool },
-}
-
-/// The keys of a frame's pipelines.
-#[derive(Clone, Copy, Debug)]
-struct Keys {
-    back_faces: [Key; 2],
-    /// Adds light triangle by triangle.
-    triangles: Key,
-    /// Draw front faces and add their light, where that is done pixel by pixel.
-    pixels: Option<[Key; 2]>,
-}
-
-impl Keys {
-    fn of(frame: &FrameShape, fog: Option<Feature>, by_pixel: bool) -> Self {
-        let (format, samples) = (frame.lit_format, frame.samples);
-        let surfaces = |from_front_faces| Key::Surfaces { format, samples, fog, from_front_faces };
-        Self {
-            back_faces: [false, true].map(|mirrored| Key::BackFaces { mirrored }),
-            triangles: surfaces(false),
-            pixels: by_pixel.then(|| [Key::FrontFaces, surfaces(true)]),
-        }
-    }
-
-    fn all(&self) -> impl Iterator<Item = Key> + use<> {
-        let pixels = self.pixels.into_iter().flatten();
-        [self.back_faces[0], self.back_faces[1], self.triangles].into_iter().chain(pixels)
-    }
+    /// Adds the refracted and reflected light of surfaces of one shape, whose reflection is in a picture or has to be
+    /// traced, triangle by triangle or where front faces have been drawn.
+    Surfaces { target: LitTarget, shape: RefractiveShape, pictured: bool, from_front_faces: bool },
 }
 
 #[derive(Debug)]
@@ -143,7 +129,9 @@ impl Effect for Refraction {
         self.called_for = [facts.census.refractive > 0, options.refraction];
         self.by_pixel = facts.refracts_by_pixel;
         self.fog = facts.settings.fog.as_ref().map(|fog| fog_feature(&fog.mode));
-        (self.surfaces, self.keys) = (Vec::new(), None);
+        self.shapes.clone_from(&facts.refractive_shapes);
+        self.has_mirrors = facts.calls_for_mirrors(options);
+        (self.surfaces, self.target) = (Vec::new(), None);
         facts.refractive > 0
     }
 
@@ -156,9 +144,10 @@ impl Effect for Refraction {
     }
 
     fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
+        let keys = self.keys_of_scene(self.target_of(frame));
         let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
         let mut ready = true;
-        for key in Keys::of(frame, self.fog, self.by_pixel).all() {
+        for key in keys {
             ready &= device.pipeline(gpu, key, false)?;
         }
         Ok(ready)
@@ -166,17 +155,17 @@ impl Effect for Refraction {
 
     fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         self.surfaces.clone_from(&frame.refractors);
-        let keys = Keys::of(frame, self.fog, self.by_pixel);
+        let target = self.target_of(frame);
+        self.target = Some(target);
+        let keys = self.keys_of_frame(target, frame.mirrors.as_deref().unwrap_or_default());
         let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
-        if !self.surfaces.is_empty() {
-            for key in keys.all() {
-                device.pipeline(gpu, key, true)?;
-            }
-            // Each surface is stored twice: as it is, and with a reflection in a picture of its own.
-            let data = self.surfaces.iter().flat_map(|surface| [surface.data, surface.data.pictured()]);
-            device.surfaces.write(gpu, &data.collect::<Vec<_>>());
+        for key in keys {
+            device.pipeline(gpu, key, true)?;
         }
-        self.keys = Some(keys);
+        if !self.surfaces.is_empty() {
+            let data: Vec<RefractorData> = self.surfaces.iter().map(|surface| surface.data).collect();
+            device.surfaces.write(gpu, &data);
+        }
         Ok(())
     }
 
@@ -191,9 +180,12 @@ impl Effect for Refraction {
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
         let [in_scene, switched_on] = self.called_for;
         // In an explanation without a device it is not known what is in sight.
-        let in_sight = self.keys.is_none() || !self.surfaces.is_empty();
+        let in_sight = self.target.is_none() || !self.surfaces.is_empty();
         // No ray leaves a pane or the surface of a pool through a back face.
-        let solid = self.keys.is_none() || self.surfaces.iter().any(RefractorSurface::is_solid);
+        let solid = match self.target {
+            None => self.shapes.contains(&RefractiveShape::Body),
+            Some(_) => self.has_bodies(),
+        };
         let [width, height] = board.size;
         let described = |format| TextureDescriptor::new_2d(width, height, format);
         let mut behind = graph.texture("behind", described(board.linear_format));
@@ -233,7 +225,7 @@ impl Effect for Refraction {
                 board.get::<MirrorPictures>().map(|pictures| pictures.0.clone()).unwrap_or_default();
             let back_faces = solid.then_some([back_normals, back_depth]);
             // The average surface of a scene whose light is added by pixels has many triangles.
-            let [by_triangle, by_pixel] = match self.keys {
+            let [by_triangle, by_pixel] = match self.target {
                 None => [!self.by_pixel, self.by_pixel],
                 Some(_) => [false, true].map(|by_pixel| self.surfaces_by(by_pixel).next().is_some()),
             };
@@ -270,10 +262,64 @@ impl Effect for Refraction {
 }
 
 impl Refraction {
-    /// Returns a pipeline of this frame and its device objects.
-    fn pipeline(&self, of: impl Fn(&Keys) -> Key) -> Option<(&OnDevice, &wgpu::RenderPipeline)> {
+    fn target_of(&self, frame: &FrameShape) -> LitTarget {
+        LitTarget { format: frame.lit_format, samples: frame.samples, fog: self.fog }
+    }
+
+    /// Returns the keys of all pipelines that frames of the scene may need.
+    fn keys_of_scene(&self, target: LitTarget) -> Vec<Key> {
+        let mut keys = self.keys_of_faces(self.shapes.contains(&RefractiveShape::Body), self.by_pixel);
+        for &shape in &self.shapes {
+            // A curved reflection has no picture, and that of a flat surface may have to be left out.
+            let has_picture = shape != RefractiveShape::Body && self.has_mirrors;
+            for pictured in [false, true].into_iter().filter(|pictured| has_picture || !pictured) {
+                let from_front_faces =
+                    [false, true].into_iter().filter(|by_pixel| self.by_pixel || !by_pixel);
+                keys.extend(from_front_faces.map(|by_pixel| Key::Surfaces {
+                    target,
+                    shape,
+                    pictured,
+                    from_front_faces: by_pixel,
+                }));
+            }
+        }
+        keys
+    }
+
+    /// Returns the keys of the pipelines that draw this frame's surfaces, given the views in its mirrors.
+    fn keys_of_frame(&self, target: LitTarget, mirrors: &[MirrorShape]) -> HashSet<Key> {
+        let seen = mirrors.iter().filter(|view| view.parent == 0).flat_map(|view| &view.surfaces);
+        let pictured: HashSet<usize> =
+            seen.filter(|mirror| mirror.refracts).map(|mirror| mirror.slot).collect();
+        let by_pixel = self.surfaces_by(true).next().is_some();
+        let mut keys: HashSet<Key> = self.keys_of_faces(self.has_bodies(), by_pixel).into_iter().collect();
+        for from_front_faces in [false, true] {
+            let surfaces = self.surfaces_by(from_front_faces);
+            keys.extend(surfaces.map(|(_, RefractorSurface { shape, slot, .. })| Key::Surfaces {
+                target,
+                shape: *shape,
+                pictured: pictured.contains(slot),
+                from_front_faces,
+            }));
+        }
+        keys
+    }
+
+    fn keys_of_faces(&self, back: bool, front: bool) -> Vec<Key> {
+        let back_faces = [false, true].map(|mirrored| Key::BackFaces { mirrored });
+        let back_faces = back_faces.into_iter().filter(|_| back);
+        back_faces.chain(front.then_some(Key::FrontFaces)).collect()
+    }
+
+    /// Returns true if any surface in view is that of a body.
+    fn has_bodies(&self) -> bool {
+        self.surfaces.iter().any(|surface| surface.shape == RefractiveShape::Body)
+    }
+
+    /// Returns a pipeline that is ready, and its device objects.
+    fn pipeline(&self, key: Key) -> Option<(&OnDevice, &wgpu::RenderPipeline)> {
         let device = self.device.as_ref()?;
-        let pipeline = device.pipelines.get(&of(self.keys.as_ref()?)).and_then(Pending::get)?.ok()?;
+        let pipeline = device.pipelines.get(&key).and_then(Pending::get)?.ok()?;
         Some((device, pipeline))
     }
 
@@ -287,16 +333,14 @@ impl Refraction {
 
     fn draw_back_faces(&self, context: &mut RasterContext<'_, FrameScene<'_>>) -> Result<(), EffectError> {
         for mirrored in [false, true] {
-            let Some((device, pipeline)) = self.pipeline(|keys| keys.back_faces[usize::from(mirrored)])
-            else {
-                continue;
-            };
+            let Some((device, pipeline)) = self.pipeline(Key::BackFaces { mirrored }) else { continue };
             let Some(view) = device.view_group(context) else { return Ok(()) };
             context.pass.set_pipeline(pipeline);
             context.pass.set_bind_group(0, &view, &[]);
-            for surface in
-                self.surfaces.iter().filter(|surface| !surface.thin && surface.mirrored == mirrored)
-            {
+            let is_drawn = |surface: &&RefractorSurface| {
+                surface.shape != RefractiveShape::Sheet && surface.mirrored == mirrored
+            };
+            for surface in self.surfaces.iter().filter(is_drawn) {
                 context.user.draw_shape(context.pass, surface.slot, &SHAPE);
             }
         }
@@ -304,7 +348,7 @@ impl Refraction {
     }
 
     fn draw_front_faces(&self, context: &mut RasterContext<'_, FrameScene<'_>>) -> Result<(), EffectError> {
-        let Some((device, pipeline)) = self.pipeline(|_| Key::FrontFaces) else { return Ok(()) };
+        let Some((device, pipeline)) = self.pipeline(Key::FrontFaces) else { return Ok(()) };
         let Some(view) = device.view_group(context) else { return Ok(()) };
         context.pass.set_pipeline(pipeline);
         context.pass.set_bind_group(0, &view, &[]);
@@ -320,22 +364,26 @@ impl Refraction {
         pictures: &Pictures,
         mirrored: &HashMap<usize, TextureHandle>,
     ) -> Result<(), EffectError> {
-        let by_pixel = pictures.front_faces.is_some();
-        let of = |keys: &Keys| keys.pixels.filter(|_| by_pixel).map_or(keys.triangles, |[_, light]| light);
-        let Some((device, pipeline)) = self.pipeline(of) else { return Ok(()) };
+        let from_front_faces = pictures.front_faces.is_some();
+        let (Some(device), Some(target)) = (&self.device, self.target) else { return Ok(()) };
         let Some(view) = device.view_group(context) else { return Ok(()) };
-        context.pass.set_pipeline(pipeline);
         context.pass.set_bind_group(0, &view, &[]);
+        let mut set = None;
         // Surfaces without a reflection picture search for their reflection in the frame so far.
         let plain = device.surface_group(&context.resources, pictures, &pictures.behind)?;
-        for (index, surface) in self.surfaces_by(by_pixel) {
+        for (index, surface) in self.surfaces_by(from_front_faces) {
             let picture = mirrored.get(&surface.slot);
+            let (shape, pictured) = (surface.shape, picture.is_some());
+            let key = Key::Surfaces { target, shape, pictured, from_front_faces };
+            let Some((_, pipeline)) = self.pipeline(key) else { continue };
+            if set.replace(key) != Some(key) {
+                context.pass.set_pipeline(pipeline);
+            }
             let own =
                 picture.map(|own| device.surface_group(&context.resources, pictures, own)).transpose()?;
             let Some(group) = own.as_ref().map_or(plain.as_ref(), Option::as_ref) else { continue };
-            let offset = SurfaceUniforms::offset(2 * index + usize::from(picture.is_some()));
-            context.pass.set_bind_group(1, group, &[offset]);
-            if !by_pixel {
+            context.pass.set_bind_group(1, group, &[SurfaceUniforms::offset(index)]);
+            if !from_front_faces {
                 context.user.draw_shape(context.pass, surface.slot, &SHAPE);
             } else if let Ok(object) = u32::try_from(surface.slot) {
                 let [x, y, width, height] = surface.window.pixels(context.user.size);
@@ -343,7 +391,7 @@ impl Refraction {
                 context.pass.draw(0..3, object..object + 1);
             }
         }
-        if by_pixel {
+        if from_front_faces {
             let [width, height] = context.user.size;
             context.pass.set_scissor_rect(0, 0, width, height);
         }
@@ -512,6 +560,8 @@ fn make(device: &wgpu::Device, layouts: &Layouts, key: Key) -> Result<wgpu::Rend
     let mut samples = 1;
     let mut fog = None;
     let mut front_faces = false;
+    // Faces alone have no light.
+    let (mut shape, mut pictured) = (RefractiveShape::Sheet, true);
     let (entry, groups, target, depth_stencil) = match key {
         Key::BackFaces { mirrored } => {
             primitive.front_face = if mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw };
@@ -523,19 +573,26 @@ fn make(device: &wgpu::Device, layouts: &Layouts, key: Key) -> Result<wgpu::Rend
             let here = depth(false, wgpu::CompareFunction::Equal);
             ("front_face", vec![Some(&layouts.view)], target(FRONT_FACES, None), Some(here))
         }
-        Key::Surfaces { format, samples: several, fog: of_scene, from_front_faces } => {
-            (samples, fog, front_faces) = (several, of_scene, from_front_faces);
+        Key::Surfaces { target: lit, shape: of_surface, pictured: has_picture, from_front_faces } => {
+            (samples, fog, front_faces) = (lit.samples, lit.fog, from_front_faces);
+            (shape, pictured) = (of_surface, has_picture);
             let here = depth(false, wgpu::CompareFunction::Equal);
             let surface = match from_front_faces {
                 true => &layouts.front_faces,
-                false => &layouts.surface[usize::from(several > 1)],
+                false => &layouts.surface[usize::from(samples > 1)],
             };
             let groups = vec![Some(&layouts.view), Some(surface)];
-            ("fragment", groups, target(format, add), (!from_front_faces).then_some(here))
+            ("fragment", groups, target(lit.format, add), (!from_front_faces).then_some(here))
         }
     };
     let mut flags = fog_flags(fog);
-    flags.extend([("MULTISAMPLED", samples > 1), ("FRONT_FACES", front_faces)]);
+    flags.extend([
+        ("MULTISAMPLED", samples > 1),
+        ("FRONT_FACES", front_faces),
+        ("SHEET", shape == RefractiveShape::Sheet),
+        ("BODY", shape == RefractiveShape::Body),
+        ("PICTURED", pictured),
+    ]);
     let module = shader::compile(device, "refraction", &flags)?;
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("refraction"),

@@ -4,7 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use lumbre_optics::Material;
-use lumbre_scene::Medium;
+use lumbre_scene::{Medium, RefractiveShape};
 
 use super::camera::Window;
 use crate::layout::{coefficient, finite};
@@ -52,8 +52,8 @@ impl Refractor {
 pub(crate) struct RefractorSurface {
     /// Slot of its object.
     pub slot: usize,
-    /// A sheet without an interior.
-    pub thin: bool,
+    /// How light passes through it.
+    pub shape: RefractiveShape,
     /// Its transform mirrors, so its triangles have the opposite winding.
     pub mirrored: bool,
     /// Number of triangles of its mesh.
@@ -61,13 +61,6 @@ pub(crate) struct RefractorSurface {
     /// A part of the frame that contains it.
     pub window: Window,
     pub data: RefractorData,
-}
-
-impl RefractorSurface {
-    /// Returns true if rays enter it and leave it through a back face.
-    pub fn is_solid(&self) -> bool {
-        !self.thin && self.data.flags & RefractorData::OPEN == 0
-    }
 }
 
 /// `Refractor` of shaders/refraction.wesl.
@@ -85,21 +78,13 @@ pub(crate) struct RefractorData {
 }
 
 impl RefractorData {
-    const THIN: u32 = 1;
-    const FRESNEL: u32 = 2;
-    const PICTURED: u32 = 4;
-    const PARALLEL: u32 = 8;
-    const OPEN: u32 = 16;
+    const FRESNEL: u32 = 1;
+    const PARALLEL: u32 = 2;
 
-    /// Creates the data of a body with a bounding sphere of this radius in metres, or of a flat surface.
-    /// `parallel` is true for a viewer at infinity; `background` is the background's radiance.
-    pub fn new(refractor: &Refractor, (radius, flat): (f64, bool), parallel: bool, background: Vec3) -> Self {
-        let flags = [
-            (refractor.thin, Self::THIN),
-            (refractor.fresnel, Self::FRESNEL),
-            (parallel, Self::PARALLEL),
-            (flat, Self::OPEN),
-        ];
+    /// Creates the data of an object with a bounding sphere of this radius in metres. `parallel` is true for a
+    /// viewer at infinity; `background` is the background's radiance.
+    pub fn new(refractor: &Refractor, radius: f64, parallel: bool, background: Vec3) -> Self {
+        let flags = [(refractor.fresnel, Self::FRESNEL), (parallel, Self::PARALLEL)];
         Self {
             mirror: refractor.mirror,
             ior: refractor.ior,
@@ -110,10 +95,5 @@ impl RefractorData {
             background,
             padding: 0.0,
         }
-    }
-
-    /// Returns the same data for a flat surface whose reflection has a picture of its own.
-    pub fn pictured(self) -> Self {
-        Self { flags: self.flags | Self::PICTURED, ..self }
     }
 }

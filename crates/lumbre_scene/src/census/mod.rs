@@ -22,7 +22,9 @@ use serde::Serialize;
 
 pub use lights::{LightCensus, light_place, shines};
 pub use lines::CensusLine;
-pub use object::{Mobility, ObjectComponents, ObjectItem, ObjectTraits, planar_mirror, shown_objects};
+pub use object::{
+    Mobility, ObjectComponents, ObjectItem, ObjectTraits, RefractiveShape, planar_mirror, shown_objects,
+};
 pub use object_census::ObjectCensus;
 
 use crate::{SceneSettings, usable_irradiance_volumes};

@@ -67,8 +67,35 @@ pub struct ObjectTraits {
     /// Whether the scene behind it can be drawn through it: it transmits light and is neither blended nor
     /// unlit.
     pub refracts: bool,
+    /// How light would pass through it.
+    pub refractive_shape: RefractiveShape,
     /// Whether the baker includes it.
     pub mobility: Mobility,
+}
+
+/// How light passes through an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RefractiveShape {
+    /// Straight through both faces of a sheet.
+    Sheet,
+    /// Through a flat surface, such as that of a pool, and not out again: it has no back face.
+    Surface,
+    /// Into a body, and out through one of its back faces.
+    Body,
+}
+
+impl RefractiveShape {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Sheet, Self::Surface, Self::Body];
+
+    /// Returns that of a flat or curved object that is thin, as its [`Medium`] says, or not.
+    pub fn new(thin: bool, flat: bool) -> Self {
+        match (thin, flat) {
+            (true, _) => Self::Sheet,
+            (false, true) => Self::Surface,
+            (false, false) => Self::Body,
+        }
+    }
 }
 
 /// Whether an object is static or moves, as its marker components say.
@@ -105,6 +132,7 @@ impl ObjectTraits {
         let back = material.back.as_ref();
         let own_back = back.filter(|_| material.double_sided);
         let roughness_map = maps.is_some_and(|maps| maps.metallic_roughness.is_some());
+        let planar_mirror = planar_mirror(mesh, material, maps, medium).is_some();
         let shines_back = |of: fn(&Surface) -> Vec3| back.is_some_and(|back| of(back) != Vec3::ZERO);
         Self {
             texture_mask: maps.map_or(0, MaterialTextures::slot_mask),
@@ -131,11 +159,12 @@ impl ObjectTraits {
             shading: shading.copied(),
             reflection: reflection.copied(),
             mirrors: material.mirror != Vec3::ZERO,
-            planar_mirror: planar_mirror(mesh, material, maps, medium).is_some(),
+            planar_mirror,
             transmits: material.transmission != Vec3::ZERO,
             refracts: material.transmission != Vec3::ZERO
                 && material.alpha_mode != AlphaMode::Blend
                 && !material.unlit,
+            refractive_shape: RefractiveShape::new(medium.is_some_and(|medium| medium.thin), planar_mirror),
             mobility: match (moves, fixed) {
                 (true, _) => Mobility::Dynamic,
                 (false, true) => Mobility::Static,

@@ -3,7 +3,7 @@
 
 use lumbre_optics::{AlphaMode, ReflectionModel, Shading};
 
-use super::object::{Mobility, ObjectTraits};
+use super::object::{Mobility, ObjectTraits, RefractiveShape};
 use crate::MaterialTextures;
 
 /// Counts over the objects of a scene that are not hidden, independent of the scene's settings.
@@ -68,7 +68,9 @@ pub struct ObjectCensus {
     pub refractive: usize,
     /// Their triangles.
     pub refractive_triangles: usize,
-    /// Of these, objects lit by a lightmap.
+    /// Of these objects, those of each of [`RefractiveShape::ALL`].
+    pub refractive_shapes: [usize; RefractiveShape::ALL.len()],
+    /// Of these objects, those lit by a lightmap.
     pub lightmapped_refractive: usize,
 }
 
@@ -144,6 +146,9 @@ impl ObjectCensus {
             (&mut self.lightmapped_refractive, traits.refracts && by_lightmap),
         ] {
             change(counter, usize::from(counts));
+        }
+        for (shape, counter) in RefractiveShape::ALL.iter().zip(&mut self.refractive_shapes) {
+            change(counter, usize::from(traits.refracts && traits.refractive_shape == *shape));
         }
         for (slot, counter) in self.textures.iter_mut().enumerate() {
             change(counter, usize::from(traits.texture_mask & (1 << slot) != 0));

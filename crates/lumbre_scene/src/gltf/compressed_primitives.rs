@@ -1,8 +1,10 @@
-//! Finds primitives with KHR_draco_mesh_compression, checks their bounds and decodes them. The codec is in
-//! `draco`.
+//! Finds primitives with KHR_draco_mesh_compression, checks their bounds and decodes them, each attribute into an
+//! accessor of its own. The codec is in `draco`.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+
+use serde_json::{Map, Value};
 
 use super::accessor_format::{Format, Reader};
 use super::buffer_view::range_of_view;
@@ -11,6 +13,7 @@ use super::draco;
 use super::error::LoadProblem;
 use super::extensions::DracoPrimitive;
 use super::limits::Budget;
+use super::patch::{Key, Patch, place};
 
 pub(crate) const EXTENSION: &str = "KHR_draco_mesh_compression";
 
@@ -32,36 +35,63 @@ struct Target<'a> {
     origin: Origin,
 }
 
-/// Decodes all primitives that are compressed with Draco.
+/// Returns true if a primitive of the file is compressed with Draco.
+pub(crate) fn is_used(root: &Map<String, Value>) -> bool {
+    let meshes = root.get("meshes").and_then(Value::as_array).into_iter().flatten();
+    let primitives = meshes.filter_map(|mesh| mesh.get("primitives")?.as_array()).flatten();
+    let mut extensions = primitives.filter_map(|primitive| primitive.get("extensions"));
+    extensions.any(|extensions| extensions.get(EXTENSION).is_some())
+}
+
+/// Gives attributes accessors of their own where they share one but have different Draco data: what an accessor says of
+/// them (type and count) may be the same, and programs that remove duplicates then keep only one. Returns true if the
+/// JSON was changed.
+pub(crate) fn separate_accessors(patch: &mut Patch, document: &Document) -> Result<bool, LoadProblem> {
+    let mut origins: HashMap<usize, Origin> = HashMap::new();
+    let mut is_changed = false;
+    for (mesh, source) in document.meshes.iter().enumerate().filter(|_| cfg!(feature = "draco")) {
+        for (index, primitive) in source.primitives.iter().enumerate() {
+            let place = || format!("{}.primitives[{index}]", document.mesh_place(mesh));
+            let Some(compressed) = compressed(primitive, place)? else { continue };
+            for Provided { accessor, attribute, .. } in provided(primitive, &compressed, &place())? {
+                let origin = (compressed.buffer_view, attribute.map(|(_, number)| number));
+                if *origins.entry(accessor).or_insert(origin) == origin {
+                    continue;
+                }
+                // An accessor that is not there is reported where it is read.
+                let Some(copy) = patch.get(&place!["accessors", accessor]).cloned() else { continue };
+                let own = patch.push("accessors", copy);
+                origins.insert(own, origin);
+                let of_primitive = place!["meshes", mesh, "primitives", index];
+                let reference: &[Key] = match attribute {
+                    Some((name, _)) => &place!["attributes", name],
+                    None => &place!["indices"],
+                };
+                patch.set(&[&of_primitive[..], reference].concat(), own.into());
+                is_changed = true;
+            }
+        }
+    }
+    Ok(is_changed)
+}
+
+/// Decodes all primitives that are compressed with Draco. No accessor may have two origins.
 pub(crate) fn decode(
     document: &Document,
     contents: &[Cow<'_, [u8]>],
     budget: &mut Budget,
 ) -> Result<DecodedAccessors, LoadProblem> {
     let mut decoded = DecodedAccessors::new();
-    let mut origins: HashMap<usize, Origin> = HashMap::new();
-    if !cfg!(feature = "draco") {
-        return Ok(decoded);
-    }
-    for (mesh, source) in document.meshes.iter().enumerate() {
+    for (mesh, source) in document.meshes.iter().enumerate().filter(|_| cfg!(feature = "draco")) {
         for (index, primitive) in source.primitives.iter().enumerate() {
             let place = || format!("{}.primitives[{index}]", document.mesh_place(mesh));
             let Some(compressed) = compressed(primitive, place)? else { continue };
             let place = place();
-            let names = names(primitive, &compressed, &place)?;
-            let targets = targets(document, &compressed, &names)?;
-            if targets.iter().all(|target| origins.get(&target.reader.index) == Some(&target.origin)) {
-                continue;
+            let provided = provided(primitive, &compressed, &place)?;
+            let targets = targets(document, &compressed, &provided)?;
+            if targets.iter().any(|target| !decoded.contains_key(&target.reader.index)) {
+                decode_one(document, contents, &compressed, &targets, &place, budget, &mut decoded)?;
             }
-            for target in &targets {
-                if origins.insert(target.reader.index, target.origin).is_some_and(|was| was != target.origin)
-                {
-                    return Err(target.reader.error(
-                        "is decoded from the Draco data of two primitives; every primitive needs accessors of its own, export the file again",
-                    ));
-                }
-            }
-            decode_one(document, contents, &compressed, &targets, &place, budget, &mut decoded)?;
         }
     }
     Ok(decoded)
@@ -78,13 +108,21 @@ pub(crate) fn compressed(
     extension(&primitive.extensions, EXTENSION, &place())
 }
 
-/// The accessors that the Draco data provides: accessor index, attribute id in the data (`None` for the
-/// indices), and a name for messages.
-fn names(
+/// What Draco data provide an accessor with.
+struct Provided<'a> {
+    accessor: usize,
+    /// The attribute's name and its number in the data; `None` for the indices of the triangles.
+    attribute: Option<(&'a str, u32)>,
+    /// For messages.
+    used_by: String,
+}
+
+/// What the Draco data of a primitive provide.
+fn provided<'a>(
     primitive: &Primitive,
-    compressed: &DracoPrimitive,
+    compressed: &'a DracoPrimitive,
     place: &str,
-) -> Result<Vec<(usize, Option<u32>, String)>, LoadProblem> {
+) -> Result<Vec<Provided<'a>>, LoadProblem> {
     let refused = |field: &str, value: &str, expected: &str| LoadProblem::Value {
         place: place.to_owned(),
         field: field.to_owned(),
@@ -99,29 +137,31 @@ fn names(
         let expected = "a primitive with Draco data needs an accessor for its indices; export the file again";
         return Err(refused("indices", "missing", expected));
     };
-    let mut names = vec![(indices, None, format!("{place}.indices"))];
+    let indices = Provided { accessor: indices, attribute: None, used_by: format!("{place}.indices") };
+    let mut provided = vec![indices];
     for (name, number) in &compressed.attributes {
         let Some(accessor) = primitive.attributes.get(name) else { continue };
         let used_by = format!("{place}.{name}");
         let accessor = serde_json::from_value(accessor.clone())
             .map_err(|source| LoadProblem::Json { place: used_by.clone(), source })?;
-        names.push((accessor, Some(*number), used_by));
+        provided.push(Provided { accessor, attribute: Some((name, *number)), used_by });
     }
-    Ok(names)
+    Ok(provided)
 }
 
 fn targets<'a>(
     document: &'a Document,
     compressed: &DracoPrimitive,
-    names: &'a [(usize, Option<u32>, String)],
+    provided: &'a [Provided<'_>],
 ) -> Result<Vec<Target<'a>>, LoadProblem> {
-    let target = |(accessor, number, used_by): &'a (usize, Option<u32>, String)| {
+    let target = |Provided { accessor, attribute, used_by }: &'a Provided<'_>| {
+        let number = attribute.map(|(_, number)| number);
         let shapes: &[&str] =
             if number.is_none() { &["SCALAR"] } else { &["SCALAR", "VEC2", "VEC3", "VEC4"] };
         let (reader, accessor, format) = Reader::of(document, *accessor, used_by, shapes)?;
-        Ok(Target { reader, format, count: accessor.count, origin: (compressed.buffer_view, *number) })
+        Ok(Target { reader, format, count: accessor.count, origin: (compressed.buffer_view, number) })
     };
-    names.iter().map(target).collect()
+    provided.iter().map(target).collect()
 }
 
 fn decode_one(

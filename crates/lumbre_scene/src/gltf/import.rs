@@ -14,7 +14,7 @@ use super::options::LoadOptions;
 use super::patch::Patch;
 use super::prepared::{Prepared, PreparedNode, PreparedPrimitive, prepare};
 use super::uri::{self, Base};
-use super::{compressed, compressed_views, container, instancing, quadric_fallback};
+use super::{compressed, compressed_primitives, compressed_views, container, instancing, quadric_fallback};
 use crate::{
     ActiveCamera, DynamicObject, EmissiveLight, Extras, Hidden, MaterialTextures, Mesh, StaticObject,
     update_transforms,
@@ -104,14 +104,21 @@ fn read(bytes: &[u8], base: Base<'_>, options: &LoadOptions) -> Result<(Prepared
     let mut notes = Notes { lenient: options.lenient, ..Notes::default() };
     let container = container::split(bytes, &mut notes)?;
     let root = document::parse(container.json)?;
-    let is_expanded = instancing::is_used(&root) || quadric_fallback::is_used(&root);
-    let mut patch = is_expanded.then(|| Patch::new(root.clone()));
+    let is_changed = instancing::is_used(&root)
+        || quadric_fallback::is_used(&root)
+        || compressed_primitives::is_used(&root);
+    let mut patch = is_changed.then(|| Patch::new(root.clone()));
     let mut document = Document::from_root(root, &mut notes)?;
     check_extensions(&document)?;
     let mut contents = contents(&document, container.binary, base, &mut notes)?;
     let mut budget = options.limits.budget(bytes.len(), &document, &contents);
     if let Some(patch) = &mut patch
         && quadric_fallback::add(patch, &document, &mut contents, &mut budget, &mut notes)?
+    {
+        document = Document::from_root(patch.root(), &mut notes)?;
+    }
+    if let Some(patch) = &mut patch
+        && compressed_primitives::separate_accessors(patch, &document)?
     {
         document = Document::from_root(patch.root(), &mut notes)?;
     }

@@ -14,7 +14,7 @@ use super::limits::Budget;
 use super::options::LoadOptions;
 use super::patch::{EarlierBake, Patch, undo_bake};
 use super::uri::{self, Base};
-use super::{compressed, container, instancing, quadric_fallback};
+use super::{compressed, compressed_primitives, container, instancing, quadric_fallback};
 
 /// A glTF file as the artist made it, with its JSON, buffers and unknown chunks preserved. Changes made by an
 /// earlier bake are undone when it is read.
@@ -76,6 +76,9 @@ impl SourceFile {
         let mut budget = options.limits.budget(bytes.len(), &document, &contents);
         let mut patch = Patch::new(root);
         if quadric_fallback::add(&mut patch, &document, &mut contents, &mut budget, &mut notes)? {
+            document = Document::from_root(patch.root(), &mut notes)?;
+        }
+        if compressed_primitives::separate_accessors(&mut patch, &document)? {
             document = Document::from_root(patch.root(), &mut notes)?;
         }
         let decoded = compressed::decode(&document, &contents, &mut budget)?;
