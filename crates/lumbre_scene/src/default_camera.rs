@@ -5,9 +5,12 @@
 //! regular grid enter the bounding box of the scene at its near face. The depth at which they hit the first
 //! triangle, as a fraction of the depth of the box, is averaged over the grid without the rays that miss. A
 //! closed side stops the rays at once (0), the open side of a room lets them reach its back wall (nearly 1),
-//! and a single object stops them halfway from every side. Horizontal views are preferred to those from above
+//! and a single object stops them halfway from every side. A side from which some of the rays pass through
+//! backs that are not drawn counts for less, such as that of a sign which can be read from the other, and so does the
+//! narrower side of a scene. Horizontal views are preferred to those from above
 //! or below unless the latter see much deeper, and among equals the first of +Z, +X, -X, -Z, +Y, -Y wins: +Z
-//! is what glTF calls the front.
+//! is what glTF calls the front. A landscape, of which a horizontal view would show little but an edge, is seen
+//! from a raised point.
 
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec2, DVec3};
@@ -27,6 +30,11 @@ const ADVANTAGE: f64 = 0.1;
 /// The same for views from above and below.
 const VERTICAL_ADVANTAGE: f64 = 0.4;
 
+/// A horizontal view is raised if the scene would fill less than this fraction of the frame's height, and to this
+/// angle in radians.
+const LOW: f64 = 0.15;
+const RAISED: f64 = std::f64::consts::FRAC_PI_6;
+
 /// The viewing directions in order of preference; the camera is on the opposite side of the scene.
 const DIRECTIONS: [DVec3; 6] = [DVec3::NEG_Z, DVec3::NEG_X, DVec3::X, DVec3::Z, DVec3::NEG_Y, DVec3::Y];
 
@@ -41,17 +49,29 @@ pub fn default_camera(world: &mut World, aspect: f64) -> (Transform, Camera) {
         return (Transform::from_xyz(0.0, 0.0, 5.0), Camera::default());
     }
     let mut best = (DIRECTIONS[0], f64::NEG_INFINITY);
-    for (direction, depth) in DIRECTIONS.iter().zip(depths(world, &bounds)) {
-        let advantage = if direction.y == 0.0 { ADVANTAGE } else { VERTICAL_ADVANTAGE };
-        if depth > best.1 + advantage {
-            best = (*direction, depth);
+    let size = bounds.max - bounds.min;
+    // The width of the side that a horizontal view shows.
+    let width = |direction: DVec3| size.dot(direction.cross(DVec3::Y).abs());
+    let widest = size.x.max(size.z).max(f64::MIN_POSITIVE);
+    for (&direction, depth) in DIRECTIONS.iter().zip(depths(world, &bounds)) {
+        let (share, advantage) = match direction.y == 0.0 {
+            true => ((width(direction) / widest).sqrt(), ADVANTAGE),
+            false => (1.0, VERTICAL_ADVANTAGE),
+        };
+        if share * depth > best.1 + advantage {
+            best = (direction, share * depth);
         }
     }
-    frame(&bounds, best.0, aspect)
+    let mut direction = best.0;
+    if direction.y == 0.0 && size.y * aspect < LOW * width(direction) {
+        direction = RAISED.cos() * direction - RAISED.sin() * DVec3::Y;
+    }
+    frame(&bounds, direction, aspect)
 }
 
 fn frame(bounds: &Bounds, direction: DVec3, aspect: f64) -> (Transform, Camera) {
-    let up = if direction.y == 0.0 { DVec3::Y } else { DVec3::NEG_Z };
+    let is_vertical = direction.x == 0.0 && direction.z == 0.0;
+    let up = if is_vertical { DVec3::NEG_Z } else { DVec3::Y.reject_from_normalized(direction).normalize() };
     let half = 0.5 * (bounds.max - bounds.min);
     let right = direction.cross(up);
     let extent = |axis: DVec3| half.dot(axis.abs());
@@ -68,7 +88,8 @@ fn frame(bounds: &Bounds, direction: DVec3, aspect: f64) -> (Transform, Camera) 
     (transform, Camera { projection, exposure: 1.0 })
 }
 
-/// The mean depth of the first hits for each viewing direction, from 0 to 1.
+/// The mean depth of the first hits for each viewing direction, from 0 to 1, times the fraction that these are of
+/// the rays that hit something in either direction.
 fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
     let size = (bounds.max - bounds.min).max(DVec3::splat(f64::MIN_POSITIVE));
     // Maps the bounding box to [0, 1]³, so that one grid serves all directions.
@@ -98,8 +119,13 @@ fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
         }
     }
     std::array::from_fn(|view| {
-        let hits: Vec<f64> = first[view].iter().copied().filter(|depth| depth.is_finite()).collect();
-        if hits.is_empty() { 0.0 } else { hits.iter().sum::<f64>() / hits.len() as f64 }
+        let depths = first[view].iter().copied().filter(|depth| depth.is_finite());
+        // The ray of a cell is the same from both ends.
+        let is_opposite = |direction: &DVec3| *direction == -DIRECTIONS[view];
+        let opposite = DIRECTIONS.iter().position(is_opposite).map_or(&first[view], |other| &first[other]);
+        let either = first[view].iter().zip(opposite).filter(|(a, b)| a.min(**b).is_finite()).count();
+        let (sum, hits) = depths.fold((0.0, 0), |(sum, hits), depth| (sum + depth, hits + 1));
+        if hits == 0 { 0.0 } else { sum / f64::from(hits) * (f64::from(hits) / either as f64) }
     })
 }
 
@@ -179,6 +205,63 @@ mod tests {
     fn a_closed_thing_is_seen_from_the_front() {
         let (transform, _) = default_camera(&mut room(None), 1.0);
         assert!(transform.translation.z > 1.0 && transform.translation.x.abs() < 1e-9);
+    }
+
+    /// Spawns a rectangle around a centre, of these two half sides, that is seen from where their cross product points to.
+    fn spawn_rectangle(world: &mut World, center: DVec3, side: DVec3, other: DVec3) {
+        let corners = [-side - other, side - other, side + other, other - side];
+        let mesh = TriangleMesh {
+            positions: corners.map(|corner| (center + corner).as_vec3()).to_vec(),
+            indices: vec![0, 1, 2, 0, 2, 3],
+            ..TriangleMesh::default()
+        };
+        world.spawn((Mesh(Arc::new(mesh)), Material::default()));
+    }
+
+    /// A sign before two small things that face away from it, and which alone are seen from behind: deep in the box.
+    #[test]
+    fn a_sign_is_seen_from_where_it_can_be_read() {
+        let mut world = World::new();
+        spawn_rectangle(&mut world, DVec3::ZERO, DVec3::X, DVec3::Y);
+        spawn_rectangle(&mut world, DVec3::new(1.5, 0.0, -0.1), DVec3::NEG_X * 0.3, DVec3::Y * 0.3);
+        spawn_rectangle(&mut world, DVec3::new(1.5, 0.9, -1.0), DVec3::NEG_X * 0.1, DVec3::Y * 0.1);
+        update_transforms(&mut world);
+        let (transform, _) = default_camera(&mut world, 1.5);
+        assert!(transform.translation.z > 1.0, "{transform:?}");
+    }
+
+    /// A thing behind a board, seen in the middle of the box along the board.
+    #[test]
+    fn a_board_is_not_seen_from_its_edge() {
+        let mut world = World::new();
+        spawn_rectangle(&mut world, DVec3::ZERO, DVec3::X, DVec3::Y);
+        spawn_rectangle(&mut world, DVec3::new(0.5, 0.0, -0.1), DVec3::NEG_Z * 0.1, DVec3::Y * 0.9);
+        update_transforms(&mut world);
+        let (transform, _) = default_camera(&mut world, 1.5);
+        assert!(transform.translation.z.abs() > 1.0, "{transform:?}");
+    }
+
+    #[test]
+    fn a_landscape_is_seen_from_a_raised_point() {
+        for (side, other) in [(50.0, 50.0), (50.0, 5.0)] {
+            let mut world = World::new();
+            spawn_rectangle(&mut world, DVec3::ZERO, DVec3::X * side, DVec3::NEG_Z * other);
+            // A wall on it, which makes a horizontal view see deeper than one from above.
+            spawn_rectangle(&mut world, DVec3::new(0.0, 1.0, -other), DVec3::X * side, DVec3::Y);
+            update_transforms(&mut world);
+            let (transform, camera) = default_camera(&mut world, 1.5);
+            let down = (transform.rotation * DVec3::NEG_Z).y;
+            assert!((-down - RAISED.sin()).abs() < 1e-6, "{transform:?}");
+            assert!(transform.translation.z > other && transform.translation.x.abs() < 1e-6, "{transform:?}");
+            let Projection::Perspective { vertical_fov, .. } = camera.projection else { panic!("parallel") };
+            let (view, tangent) = (transform.affine().inverse(), (0.5 * vertical_fov).tan());
+            for (x, y, z) in
+                [(-side, 0.0, -other), (side, 2.0, -other), (side, 0.0, other), (-side, 2.0, other)]
+            {
+                let point = view.transform_point3(DVec3::new(x, y, z));
+                assert!(point.y.abs() < -point.z * tangent && point.x.abs() < -point.z * tangent * 1.5);
+            }
+        }
     }
 
     #[test]
