@@ -37,6 +37,7 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         world.resource_mut::<SceneSettings>().sky = sky;
     }
     check_light(&mut world, asked)?;
+    check_unlit(&mut world, &asked.input)?;
     note_metals(&mut world, &asked.input);
     let options = options(asked);
     let files = save_options(asked);
@@ -258,6 +259,31 @@ fn check_light(world: &mut World, asked: &Bake) -> anyhow::Result<()> {
         "{input}: there is nothing to bake: it has no light that is baked, no emission and no sky; \
          `lumbre bake {input} -o {output} --sky 1` bakes it under an even white sky"
     )
+}
+
+/// Says how many static meshes are unlit, which a bake leaves out.
+///
+/// # Errors
+/// If all of them are: then there is nothing to bake.
+fn check_unlit(world: &mut World, input: &Path) -> anyhow::Result<()> {
+    let mut materials = world.query_filtered::<&Material, With<StaticObject>>();
+    let (count, unlit) = materials
+        .iter(world)
+        .fold((0, 0), |(count, unlit), material| (count + 1, unlit + u32::from(material.unlit)));
+    let input = input.display();
+    if unlit > 0 && unlit == count {
+        bail!(
+            "{input}: there is nothing to bake: every static mesh is unlit (KHR_materials_unlit), and shows its colour as it is; \
+             give those that are to be lit another material"
+        );
+    }
+    if unlit > 0 {
+        eprintln!(
+            "lumbre: note: {input}: {unlit} of {count} static meshes are unlit: they show their colour as it is, and neither \
+             take baked light nor block it"
+        );
+    }
+    Ok(())
 }
 
 /// Says how many static meshes are metal: without diffuse reflection, they take baked light by what stands for their

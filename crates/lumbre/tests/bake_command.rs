@@ -15,7 +15,8 @@ use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre::optics::{Material, Surface};
 use lumbre::scene::{
-    Camera, MaterialTextures, Mesh, MetallicRoughnessTexture, StaticObject, TextureReference, Transform,
+    Camera, Lightmap, MaterialTextures, Mesh, MetallicRoughnessTexture, Name, StaticObject, TextureReference,
+    Transform,
 };
 
 const LUMBRE: &str = env!("CARGO_BIN_EXE_lumbre");
@@ -428,6 +429,45 @@ fn metals_are_counted() {
     lumbre::scene::save(&mut world, &place.level).unwrap();
     let said = stderr(&done(&mut place.bake(&["--sky", "1"])));
     assert!(said.contains("2 of 5 static meshes are metal"), "{said}");
+}
+
+/// A sky dome around a level would leave it black, and take most of its texels.
+#[test]
+fn unlit_meshes_neither_take_light_nor_block_it() {
+    let place = place();
+    let dome = |unlit| Material { unlit, double_sided: true, ..Material::matt(Vec3::splat(0.5)) };
+    let level = |unlit: bool, with_floor: bool| {
+        let mut world = World::new();
+        let sphere = Mesh(Arc::new(lumbre::mesh::shapes::uv_sphere(20.0, 16, 8)));
+        world.spawn((sphere, dome(unlit), StaticObject, Transform::default(), Name::new("dome")));
+        if with_floor {
+            let floor = Mesh(Arc::new(lumbre::mesh::shapes::cuboid(Vec3::new(4.0, 0.2, 4.0), 1)));
+            world.spawn((floor, Material::matt(Vec3::splat(0.5)), StaticObject, Transform::default()));
+        }
+        lumbre::scene::save(&mut world, &place.level).unwrap();
+    };
+    level(true, true);
+    let said = stderr(&done(&mut place.bake(&["--sky", "1"])));
+    assert!(said.contains("1 of 2 static meshes are unlit"), "{said}");
+    let mut world = World::new();
+    lumbre::scene::load(&mut world, &place.output).unwrap();
+    let mut maps = world.query::<(&Material, Option<&Lightmap>)>();
+    for (material, map) in maps.iter(&world) {
+        assert_eq!(map.is_none(), material.unlit);
+    }
+    // The top of the floor sees nothing but the sky, of radiance 1: E/π is 1, and nowhere is more.
+    let mut maps = world.query::<&Lightmap>();
+    let texels = maps.iter(&world).flat_map(|map| map.image.texels.clone());
+    let brightest = texels.map(Vec3::max_element).fold(0.0, f32::max);
+    assert!((brightest - 1.0).abs() < 0.01, "{brightest}");
+
+    level(false, true);
+    assert!(!stderr(&done(&mut place.bake(&["--sky", "1"]))).contains("unlit"));
+    level(true, false);
+    let refused = place.bake(&["--sky", "1"]).output().unwrap();
+    assert!(!refused.status.success());
+    let said = stderr(&refused);
+    assert!(said.contains("every static mesh is unlit"), "{said}");
 }
 
 #[test]

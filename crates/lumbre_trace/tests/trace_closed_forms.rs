@@ -14,6 +14,47 @@ use lumbre_trace::{Kind, TraceOptions};
 
 use support::*;
 
+/// A dome around a scene, or a picture in front of a lamp, shows its colour to the eye and changes no light.
+#[test]
+fn unlit_surfaces_neither_block_light_nor_take_part_in_it() {
+    let unlit = |mode| Material {
+        unlit: true,
+        double_sided: true,
+        alpha: 0.5,
+        alpha_mode: mode,
+        ..Material::matt(Vec3::splat(0.4))
+    };
+    let lit = |mode: Option<AlphaMode>| {
+        let mut world = World::new();
+        let floor = Mesh(Arc::new(shapes::plane(20.0, 20.0, 1, 1)));
+        world.spawn((floor, Material::matt(Vec3::splat(0.5))));
+        let lamp = Transform::from_xyz(0.5, 2.0, 0.0);
+        world.spawn((Light::point(Vec3::splat(4.0)), lamp));
+        furnace(&mut world, 0.3);
+        if let Some(mode) = mode {
+            let dome = Mesh(Arc::new(shapes::uv_sphere(12.0, 24, 12)));
+            world.spawn((dome, unlit(mode)));
+            let pane = Mesh(Arc::new(shapes::plane(4.0, 4.0, 1, 1)));
+            world.spawn((pane, unlit(mode), Transform::from_xyz(0.0, 1.5, 0.0)));
+        }
+        look_from(&mut world, DVec3::new(0.0, 1.0, 0.1), DVec3::ZERO, 0.5);
+        world
+    };
+    for mode in [AlphaMode::Opaque, AlphaMode::Mask { cutoff: 0.3 }, AlphaMode::Blend] {
+        for options in [options(16), paths(16, 4)] {
+            let (open, _) = draw(&mut lit(None), &options);
+            let (same, _) = draw(&mut lit(Some(mode)), &options);
+            for (open, same) in open.radiance.iter().zip(&same.radiance) {
+                assert!(
+                    (*open - *same).abs().max_element() <= 1e-9 * open.max_element(),
+                    "{mode:?}: {same} for {open}"
+                );
+                assert!(open.min_element() > 0.1);
+            }
+        }
+    }
+}
+
 #[test]
 fn a_mirror_ball_turns_rays_by_the_angle_of_their_offset() {
     // A ray that passes the centre at a distance b hits the sphere at the angle asin(b) and is turned by π -

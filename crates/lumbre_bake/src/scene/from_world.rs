@@ -58,7 +58,8 @@ fn objects(world: &mut World) -> (Vec<SceneObject>, Entities) {
         (lights_frames, scale),
     ) in query.iter(world)
     {
-        if hidden.contains(&entity) || has_dynamic_ancestor(world, parent) {
+        // An unlit surface, such as a sky dome, neither takes light nor blocks it, as in a frame.
+        if hidden.contains(&entity) || material.unlit || has_dynamic_ancestor(world, parent) {
             continue;
         }
         let (mesh, textures) = UnwrappedFrom::read(unwrapped, mesh, textures);

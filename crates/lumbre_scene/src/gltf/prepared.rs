@@ -200,7 +200,7 @@ pub(crate) fn prepare(
                 .map(|source| irradiance_volume(&source, &place, base, &limits, &mut images.budget))
                 .transpose()?;
         if let Some(primitives) = lightmap.as_ref().and(node.mesh).and_then(|mesh| meshes.get(&mesh))
-            && primitives.iter().any(|primitive| primitive.mesh.uv1.is_empty())
+            && primitives.iter().any(|primitive| primitive.mesh.uv1.is_empty() && !primitive.material.unlit)
         {
             notes.add(
                 &place,

@@ -37,7 +37,8 @@ pub(crate) struct Scene {
     pub see_through: bool,
     /// Opposite corners of a box around everything that covers its background in part; `None` if nothing does.
     covered: Option<[DVec3; 2]>,
-    /// Whether any object has holes, by an alpha mask.
+    /// Whether light passes any object, or some of its holes, as if it were not there: by an alpha mask, or because it is
+    /// unlit.
     pub holes: bool,
     /// Whether any object is a refracting solid.
     pub solids: bool,
@@ -52,6 +53,8 @@ struct Passable {
     shows_back: bool,
     thin: bool,
     solid: bool,
+    /// It shows its colour to the viewer and takes no part in the light.
+    unlit: bool,
 }
 
 /// Beyond this distance of the eye from the world's origin, in metres, the eye becomes the tracer's origin,
@@ -95,14 +98,17 @@ impl Scene {
             .collect();
         let passable: Vec<Passable> = collected.objects.iter().map(Passable::of).collect();
         // Glowing objects may be bulbs, which let the light of their lamp pass.
-        let always_blocks =
-            |index: usize| passable[index].passage == Passage::Closed && !collected.objects[index].glows();
+        let always_blocks = |index: usize| {
+            let Passable { passage, unlit, .. } = passable[index];
+            passage == Passage::Closed && !unlit && !collected.objects[index].glows()
+        };
         let geometry = Geometry::build(&triangles, &counts, &quadrics, always_blocks);
-        let is_open = |found: &Passable| matches!(found.passage, Passage::Clear | Passage::Covering);
+        let is_open =
+            |found: &Passable| !found.unlit && matches!(found.passage, Passage::Clear | Passage::Covering);
         Ok(Self {
             see_through: passable.iter().any(is_open),
             covered: box_of_coverings(&collected.objects, exact),
-            holes: passable.iter().any(|found| found.passage == Passage::Cut),
+            holes: passable.iter().any(|found| found.unlit || found.passage == Passage::Cut),
             solids: passable.iter().any(|found| found.solid),
             passable,
             geometry,
@@ -118,13 +124,15 @@ impl Scene {
     /// Returns true if a viewing ray sees the surface there: it is neither a culled back nor a hole in an
     /// alpha mask.
     pub fn is_seen(&self, candidate: &Candidate) -> bool {
-        (candidate.front || self.passable[candidate.object].shows_back) && self.blocks(candidate)
+        let Passable { shows_back, passage, .. } = self.passable[candidate.object];
+        (candidate.front || shows_back) && (passage != Passage::Cut || !self.is_hole(candidate))
     }
 
     /// Returns true if the surface blocks light there, wholly or in part. Both sides do, but not the holes in
-    /// an alpha mask.
+    /// an alpha mask, and unlit surfaces do not.
     pub fn blocks(&self, candidate: &Candidate) -> bool {
-        self.passable[candidate.object].passage != Passage::Cut || !self.is_hole(candidate)
+        let Passable { unlit, passage, .. } = self.passable[candidate.object];
+        !unlit && (passage != Passage::Cut || !self.is_hole(candidate))
     }
 
     /// Returns how rays pass an object.
@@ -147,6 +155,7 @@ impl Scene {
     pub fn is_open(&self, object: usize, with_solids: bool) -> bool {
         let object = self.passable[object];
         match object.passage {
+            _ if object.unlit => false,
             Passage::Covering => true,
             Passage::Clear => with_solids || object.thin,
             Passage::Closed | Passage::Cut => false,
@@ -217,6 +226,7 @@ impl Passable {
             shows_back: object.shows_back(),
             thin: object.medium.thin,
             solid: object.is_solid(),
+            unlit: object.material.unlit,
         }
     }
 }
