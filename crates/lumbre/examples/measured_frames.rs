@@ -24,11 +24,11 @@ fn main() -> anyhow::Result<()> {
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().with_context(|| format!("{argument} needs a value"));
         match argument.as_str() {
-            "--pairs" => pairs = value()?.parse::<usize>()?.max(1),
+            "--pairs" => pairs = value()?.parse::<usize>().context("--pairs takes a number")?.max(1),
             "--size" => {
                 let text = value()?;
-                let (width, height) = text.split_once('x').context("--size takes WIDTHxHEIGHT")?;
-                size = (width.parse()?, height.parse()?);
+                let sides = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+                size = sides.context("--size takes WIDTHxHEIGHT")?;
             }
             unknown if unknown.starts_with("--") => bail!("{unknown} is unknown"),
             _ => files.push(argument),

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use bevy_ecs::entity::Entity;
 use bevy_ecs::query::With;
 use bevy_ecs::world::World;
 use glam::DVec3;
@@ -19,7 +20,7 @@ use lumbre::demo::{ATLAS_SIDE, has_light_to_bake};
 use lumbre::optics::{Material, SurfaceSample};
 use lumbre::scene::{
     LightmapEncoding, MaterialTextures, MetallicRoughnessTexture, SaveOptions, SceneSettings, StaticObject,
-    Supercompression, save_baked,
+    Supercompression, hidden_entities, save_baked,
 };
 
 use crate::arguments::{Bake, BakeFormFactors, BakeProbes, BakeQuality, BakeSolver, ExrTexels};
@@ -36,8 +37,8 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     if let Some(sky) = asked.sky {
         world.resource_mut::<SceneSettings>().sky = sky;
     }
-    check_light(&mut world, asked)?;
     check_unlit(&mut world, &asked.input)?;
+    check_light(&mut world, asked)?;
     note_metals(&mut world, &asked.input);
     let options = options(asked);
     let files = save_options(asked);
@@ -264,12 +265,13 @@ fn check_light(world: &mut World, asked: &Bake) -> anyhow::Result<()> {
 /// Says how many static meshes are unlit, which a bake leaves out.
 ///
 /// # Errors
-/// If all of them are: then there is nothing to bake.
+/// If all of those that are shown are: then there is nothing to bake.
 fn check_unlit(world: &mut World, input: &Path) -> anyhow::Result<()> {
-    let mut materials = world.query_filtered::<&Material, With<StaticObject>>();
-    let (count, unlit) = materials
-        .iter(world)
-        .fold((0, 0), |(count, unlit), material| (count + 1, unlit + u32::from(material.unlit)));
+    let hidden = hidden_entities(world);
+    let mut materials = world.query_filtered::<(Entity, &Material), With<StaticObject>>();
+    let shown = materials.iter(world).filter(|(entity, _)| !hidden.contains(entity));
+    let (count, unlit) =
+        shown.fold((0, 0), |(count, unlit), (_, material)| (count + 1, unlit + u32::from(material.unlit)));
     let input = input.display();
     if unlit > 0 && unlit == count {
         bail!(

@@ -6,12 +6,11 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{
-    Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, has_light_to_bake,
+    Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, baked_meshes,
+    has_light_to_bake,
 };
 use lumbre_optics::Material;
-use lumbre_scene::{
-    GlobalTransform, Lightmap, LightmapImage, MaterialTextures, Mesh, StaticObject, hidden_entities,
-};
+use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, MaterialTextures, Mesh};
 
 use crate::converged::Maps;
 use crate::picture::Picture;
@@ -77,7 +76,9 @@ pub fn nothing_to_bake(conditions: &Conditions<'_>, scene: &SceneFile) -> Result
 pub fn nothing_to_bake_in(world: &mut World, name: &str) -> Option<String> {
     match (static_area(world) > 0.0, has_light_to_bake(world)) {
         (true, true) => None,
-        (false, _) => Some(format!("Nothing in {name} is static, so there is nothing to bake.")),
+        (false, _) => {
+            Some(format!("Everything in {name} moves, is hidden or is unlit, so there is nothing to bake."))
+        }
         (_, false) => Some(format!(
             "{name} has no baked lights, no emission and no sky, so its lightmaps would be black."
         )),
@@ -98,10 +99,10 @@ pub fn few_bakes(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Optio
         return Ok(None);
     }
     let mut world = scene.open(conditions.aspect())?;
-    let hidden = hidden_entities(&mut world);
-    let mut objects = world.query_filtered::<(Entity, &Mesh), With<StaticObject>>();
-    let shown = objects.iter(&world).filter(|(entity, _)| !hidden.contains(entity));
-    let triangles = shown.map(|(_, mesh)| mesh.0.triangle_count()).sum::<usize>();
+    let baked = baked_meshes(&mut world);
+    let mut objects = world.query::<(Entity, &Mesh)>();
+    let static_objects = objects.iter(&world).filter(|(entity, _)| baked.contains(entity));
+    let triangles = static_objects.map(|(_, mesh)| mesh.0.triangle_count()).sum::<usize>();
     Ok((triangles > MANY_TRIANGLES).then(|| {
         format!(
             "{} has {triangles} static triangles, so that each bake takes seconds. This quick report makes fewer of them than a full one.",
@@ -112,8 +113,8 @@ pub fn few_bakes(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Optio
 
 /// Returns the area of everything that is baked, in square metres.
 fn static_area(world: &mut World) -> f64 {
-    let hidden = hidden_entities(world);
-    let mut objects = world.query_filtered::<(Entity, &Mesh, &GlobalTransform), With<StaticObject>>();
+    let baked = baked_meshes(world);
+    let mut objects = world.query::<(Entity, &Mesh, &GlobalTransform)>();
     let area = |(_, mesh, place): (Entity, &Mesh, &GlobalTransform)| {
         let corner = |index: u32| {
             let point = mesh.0.positions.get(index as usize).copied().unwrap_or(Vec3::ZERO);
@@ -128,7 +129,7 @@ fn static_area(world: &mut World) -> f64 {
             .filter(|area| area.is_finite())
             .sum::<f64>()
     };
-    objects.iter(world).filter(|(entity, ..)| !hidden.contains(entity)).map(area).sum()
+    objects.iter(world).filter(|(entity, ..)| baked.contains(entity)).map(area).sum()
 }
 
 /// Bakes a scene. `told` are the fractions of the study that are done before and after.

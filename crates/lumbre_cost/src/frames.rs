@@ -444,4 +444,25 @@ mod tests {
         }
         Ok(())
     }
+    #[test]
+    fn a_frame_that_is_timed_is_drawn_once() -> Result<(), CostError> {
+        let gpu = Gpu::headless()?;
+        let target = Offscreen::new(&gpu, 48, 27, OffscreenFormat::Rgba8)?;
+        let (mut world, mut renderer) = (room(Air::Clear), Renderer::new(&gpu));
+        update_transforms(&mut world);
+        let options = FrameOptions { measure: Measure::Time, ..FrameOptions::default() };
+        for number in 1..=3 {
+            let milliseconds = timed_frame(&mut renderer, &mut world, &target.target(), &options)?;
+            let account = renderer.accounting();
+            let drawn = account.map(|account| account.frame);
+            assert_eq!(drawn, Some(number));
+            // The time contains the whole frame.
+            let whole = account.and_then(|account| account.wall_ms);
+            assert!(
+                whole.is_some_and(|whole| 0.0 < whole && whole <= milliseconds),
+                "{whole:?} {milliseconds}"
+            );
+        }
+        Ok(())
+    }
 }

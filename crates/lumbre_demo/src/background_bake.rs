@@ -14,11 +14,12 @@ use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{Bake, BakeOptions, BakeReport, CancelToken, Density, Quality, has_light_to_bake};
+use lumbre_bake::{
+    Bake, BakeOptions, BakeReport, CancelToken, Density, Quality, baked_meshes, has_light_to_bake,
+};
 use lumbre_scene::{
     GlobalTransform, IrradianceVolume, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh, Name,
-    PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject, Transform,
-    save_baked,
+    PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, Transform, save_baked,
 };
 
 /// One of several bakes of increasing quality.
@@ -429,10 +430,11 @@ fn leaving_a_core(options: BakeOptions) -> BakeOptions {
     BakeOptions { threads: options.threads.or(Some(cores)), ..options }
 }
 
-/// Returns the area of all static meshes in square metres.
+/// Returns the area of all meshes that are baked, in square metres.
 fn area(world: &mut World) -> f64 {
-    let mut meshes = world.query_filtered::<(&Mesh, &GlobalTransform), With<StaticObject>>();
-    let of_mesh = |(mesh, place): (&Mesh, &GlobalTransform)| {
+    let baked = baked_meshes(world);
+    let mut meshes = world.query::<(Entity, &Mesh, &GlobalTransform)>();
+    let of_mesh = |(_, mesh, place): (Entity, &Mesh, &GlobalTransform)| {
         let corner = |index: u32| {
             let position = mesh.0.positions.get(index as usize).copied().unwrap_or_default();
             place.0.transform_point3(position.as_dvec3())
@@ -443,7 +445,7 @@ fn area(world: &mut World) -> f64 {
         });
         areas.filter(|area| area.is_finite()).sum::<f64>()
     };
-    meshes.iter(world).map(of_mesh).sum()
+    meshes.iter(world).filter(|(entity, ..)| baked.contains(entity)).map(of_mesh).sum()
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@
 //! narrower side of a scene. Horizontal views are preferred to those from above
 //! or below unless the latter see much deeper, and among equals the first of +Z, +X, -X, -Z, +Y, -Y wins: +Z
 //! is what glTF calls the front. A landscape, of which a horizontal view would show little but an edge, is seen
-//! from a raised point.
+//! from a raised point unless something covers it.
 
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec2, DVec3};
@@ -34,6 +34,8 @@ const VERTICAL_ADVANTAGE: f64 = 0.4;
 /// angle in radians.
 const LOW: f64 = 0.15;
 const RAISED: f64 = std::f64::consts::FRAC_PI_6;
+/// It is not raised unless rays from above reach at least this depth.
+const OPEN_ABOVE: f64 = 0.5;
 
 /// The viewing directions in order of preference; the camera is on the opposite side of the scene.
 const DIRECTIONS: [DVec3; 6] = [DVec3::NEG_Z, DVec3::NEG_X, DVec3::X, DVec3::Z, DVec3::NEG_Y, DVec3::Y];
@@ -53,7 +55,8 @@ pub fn default_camera(world: &mut World, aspect: f64) -> (Transform, Camera) {
     // The width of the side that a horizontal view shows.
     let width = |direction: DVec3| size.dot(direction.cross(DVec3::Y).abs());
     let widest = size.x.max(size.z).max(f64::MIN_POSITIVE);
-    for (&direction, depth) in DIRECTIONS.iter().zip(depths(world, &bounds)) {
+    let depths = depths(world, &bounds);
+    for (&direction, depth) in DIRECTIONS.iter().zip(depths) {
         let (share, advantage) = match direction.y == 0.0 {
             true => ((width(direction) / widest).sqrt(), ADVANTAGE),
             false => (1.0, VERTICAL_ADVANTAGE),
@@ -63,7 +66,9 @@ pub fn default_camera(world: &mut World, aspect: f64) -> (Transform, Camera) {
         }
     }
     let mut direction = best.0;
-    if direction.y == 0.0 && size.y * aspect < LOW * width(direction) {
+    // A roof would hide what it covers.
+    let [.., from_above, _] = depths;
+    if direction.y == 0.0 && from_above > OPEN_ABOVE && size.y * aspect < LOW * width(direction) {
         direction = RAISED.cos() * direction - RAISED.sin() * DVec3::Y;
     }
     frame(&bounds, direction, aspect)
@@ -88,10 +93,12 @@ fn frame(bounds: &Bounds, direction: DVec3, aspect: f64) -> (Transform, Camera) 
     (transform, Camera { projection, exposure: 1.0 })
 }
 
-/// The mean depth of the first hits for each viewing direction, from 0 to 1, times the fraction that these are of
-/// the rays that hit something in either direction.
+/// The mean depth of the first hits for each viewing direction, from 0 to 1, over the rays that hit something in either
+/// direction; those that pass backs which are not drawn count as 0.
 fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
-    let size = (bounds.max - bounds.min).max(DVec3::splat(f64::MIN_POSITIVE));
+    // A flat scene has no depth, but its coordinates must not overflow.
+    let least = (1e-9 * bounds.radius()).max(1e-200);
+    let size = (bounds.max - bounds.min).max(DVec3::splat(least));
     // Maps the bounding box to [0, 1]³, so that one grid serves all directions.
     let unit = DAffine3::from_scale(size.recip()) * DAffine3::from_translation(-bounds.min);
     let mut first = vec![[f64::INFINITY; GRID * GRID]; 6];
@@ -124,8 +131,8 @@ fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
         let is_opposite = |direction: &DVec3| *direction == -DIRECTIONS[view];
         let opposite = DIRECTIONS.iter().position(is_opposite).map_or(&first[view], |other| &first[other]);
         let either = first[view].iter().zip(opposite).filter(|(a, b)| a.min(**b).is_finite()).count();
-        let (sum, hits) = depths.fold((0.0, 0), |(sum, hits), depth| (sum + depth, hits + 1));
-        if hits == 0 { 0.0 } else { sum / f64::from(hits) * (f64::from(hits) / either as f64) }
+        // The mean over all rays that hit something, of which those that pass backs count as 0.
+        depths.sum::<f64>() / either.max(1) as f64
     })
 }
 
@@ -218,6 +225,20 @@ mod tests {
         world.spawn((Mesh(Arc::new(mesh)), Material::default()));
     }
 
+    #[test]
+    fn a_flat_thing_is_seen_from_its_front_wherever_it_is() {
+        for facing in [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z] {
+            for distance in [0.0, 5.0, -300.0] {
+                let mut world = World::new();
+                spawn_rectangle(&mut world, facing * distance, DVec3::Y.cross(facing), DVec3::Y);
+                update_transforms(&mut world);
+                let (transform, _) = default_camera(&mut world, 1.5);
+                let along = (transform.translation - facing * distance).dot(facing);
+                assert!(along > 1.0, "at {distance}, facing {facing}: {transform:?}");
+            }
+        }
+    }
+
     /// A sign before two small things that face away from it, and which alone are seen from behind: deep in the box.
     #[test]
     fn a_sign_is_seen_from_where_it_can_be_read() {
@@ -262,6 +283,20 @@ mod tests {
                 assert!(point.y.abs() < -point.z * tangent && point.x.abs() < -point.z * tangent * 1.5);
             }
         }
+    }
+
+    #[test]
+    fn a_wide_room_is_seen_through_its_open_side() {
+        let mut world = World::new();
+        let (across, deep) = (DVec3::X * 20.0, DVec3::NEG_Z * 5.0);
+        spawn_rectangle(&mut world, DVec3::ZERO, across, deep);
+        spawn_rectangle(&mut world, -5.0 * DVec3::Z + 1.5 * DVec3::Y, across, DVec3::Y * 1.5);
+        // Its ceiling is seen from both sides.
+        spawn_rectangle(&mut world, 3.0 * DVec3::Y, across, deep);
+        world.query::<&mut Material>().iter_mut(&mut world).for_each(|mut side| side.double_sided = true);
+        update_transforms(&mut world);
+        let (transform, _) = default_camera(&mut world, 16.0 / 9.0);
+        assert!((transform.rotation * DVec3::NEG_Z).dot(DVec3::NEG_Z) > 0.999, "{transform:?}");
     }
 
     #[test]

@@ -58,22 +58,55 @@ fn draco_meshes_are_what_the_reference_decoder_finds() {
     }
 }
 
-#[test]
-fn attributes_that_share_an_accessor_have_their_own_draco_data() {
-    let _alone = MEASURING.lock();
-    let (name, bytes, expected) = MESHES[0];
+/// A file of which two attributes share an accessor, as programs that remove duplicates leave them: both are three floats
+/// for each of as many vertices.
+fn sharing_an_accessor() -> (File, std::sync::Arc<lumbre_mesh::TriangleMesh>) {
+    let (_, bytes, expected) = MESHES[0];
     let expected: Value = serde_json::from_slice(expected).unwrap();
     let (mut alone, _) = compressed_mesh(bytes, &expected).load().unwrap();
-    let alone = the_mesh(&mut alone);
-    assert!(alone.normals != alone.positions);
-    // As a program that removes duplicates leaves them: both are three floats for each of as many vertices.
     let mut file = compressed_mesh(bytes, &expected);
     let attributes = &mut file.root["meshes"][0]["primitives"][0]["attributes"];
     attributes["NORMAL"] = attributes["POSITION"].clone();
+    (file, the_mesh(&mut alone))
+}
+
+#[test]
+fn attributes_that_share_an_accessor_have_their_own_draco_data() {
+    let _alone = MEASURING.lock();
+    let (file, alone) = sharing_an_accessor();
+    assert!(alone.normals != alone.positions);
     let (mut shared, _) = file.load().unwrap();
     let shared = the_mesh(&mut shared);
-    assert_eq!((&shared.positions, &shared.normals), (&alone.positions, &alone.normals), "{name}");
-    assert_eq!((&shared.uv0, &shared.indices), (&alone.uv0, &alone.indices), "{name}");
+    assert_eq!((&shared.positions, &shared.normals), (&alone.positions, &alone.normals));
+    assert_eq!((&shared.uv0, &shared.indices), (&alone.uv0, &alone.indices));
+}
+
+#[test]
+fn a_reference_that_leads_nowhere_does_not_lead_to_an_added_accessor() {
+    let _alone = MEASURING.lock();
+    let (mut file, _) = sharing_an_accessor();
+    let accessors = file.root["accessors"].as_array().unwrap().len();
+    let nowhere = json!({"attributes": {"POSITION": accessors}});
+    file.root["meshes"][0]["primitives"].as_array_mut().unwrap().push(nowhere);
+    let text = file.problem().to_string();
+    assert!(text.contains(&format!("accessors[{accessors}]")), "{text}");
+}
+
+#[test]
+fn what_accessors_say_is_not_copied_without_end() {
+    let _alone = MEASURING.lock();
+    let (mut file, _) = sharing_an_accessor();
+    file.root["accessors"][0]["extras"] = "x".repeat(1 << 20).into();
+    let primitive = file.root["meshes"][0]["primitives"][0].clone();
+    for number in 100..200 {
+        let mut primitive = primitive.clone();
+        primitive["extensions"]["KHR_draco_mesh_compression"]["attributes"]["POSITION"] = number.into();
+        file.root["meshes"][0]["primitives"].as_array_mut().unwrap().push(primitive);
+    }
+    let limits = LoadLimits { decoded_bytes: Some(32 << 20), ..LoadLimits::default() };
+    let loaded = load_slice_within(&mut World::new(), &file.glb(), "test.glb", None, limits);
+    let problem = loaded.err().map(|error| *error.problem);
+    assert!(matches!(problem, Some(LoadProblem::TooLarge { .. })), "{problem:?}");
 }
 
 fn the_picture(world: &mut World) -> std::sync::Arc<Image> {

@@ -106,15 +106,15 @@ impl EndSurface {
             return 1.0;
         }
         let place = self.place(ray, distance);
-        let seen = |candidate: &Candidate| scene.is_seen(candidate);
-        let covers = |candidate: &Candidate| is_opaque(scene.passage(candidate.object)) && seen(candidate);
+        let dims = |candidate: &Candidate| scene.is_seen(candidate) && scene.blocks(candidate);
+        let covers = |candidate: &Candidate| is_opaque(scene.passage(candidate.object)) && dims(candidate);
         if is_glass && place.nearest(scene, covers).is_some() {
             return 0.0;
         }
         if !may_be_covered {
             return 1.0;
         }
-        let coverings = place.coverings(scene, seen);
+        let coverings = place.coverings(scene, dims);
         coverings.iter().map(|hit| 1.0 - SurfacePoint::new(scene, &place.around, hit).coverage).product()
     }
 

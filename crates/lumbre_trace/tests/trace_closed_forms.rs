@@ -9,7 +9,7 @@ use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{AlphaMode, Fog, FogMode, Light, Material};
-use lumbre_scene::{Medium, Mesh, Quadric, QuadricShape, SceneSettings, Transform};
+use lumbre_scene::{EmissiveLight, Medium, Mesh, Quadric, QuadricShape, SceneSettings, Transform};
 use lumbre_trace::{Kind, TraceOptions};
 
 use support::*;
@@ -30,12 +30,17 @@ fn unlit_surfaces_neither_block_light_nor_take_part_in_it() {
         world.spawn((floor, Material::matt(Vec3::splat(0.5))));
         let lamp = Transform::from_xyz(0.5, 2.0, 0.0);
         world.spawn((Light::point(Vec3::splat(4.0)), lamp));
+        // A panel that shines down, and which the picture lies on.
+        let panel = Transform::from_xyz(-1.0, 2.0, 0.0).with_rotation(DQuat::from_rotation_x(PI));
+        let square = Mesh(Arc::new(shapes::plane(1.0, 1.0, 1, 1)));
+        world.spawn((square.clone(), glowing(3.0, 0.0), EmissiveLight, panel));
         furnace(&mut world, 0.3);
         if let Some(mode) = mode {
             let dome = Mesh(Arc::new(shapes::uv_sphere(12.0, 24, 12)));
             world.spawn((dome, unlit(mode)));
             let pane = Mesh(Arc::new(shapes::plane(4.0, 4.0, 1, 1)));
             world.spawn((pane, unlit(mode), Transform::from_xyz(0.0, 1.5, 0.0)));
+            world.spawn((square, unlit(mode), panel));
         }
         look_from(&mut world, DVec3::new(0.0, 1.0, 0.1), DVec3::ZERO, 0.5);
         world

@@ -12,6 +12,7 @@ use lumbre_scene::{
     Primitive, SceneSettings, StaticObject, hidden_entities, propagate_transforms,
 };
 
+use super::baked_meshes::{baked_meshes, has_dynamic_ancestor};
 use super::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, world_points};
 use crate::UnwrappedFrom;
 
@@ -38,7 +39,7 @@ fn objects(world: &mut World) -> (Vec<SceneObject>, Entities) {
         scale: Option<f64>,
     }
     let mut by_owner: BTreeMap<Entity, Vec<FoundPrimitive>> = BTreeMap::new();
-    let hidden = hidden_entities(world);
+    let baked = baked_meshes(world);
     let mut query = world.query_filtered::<(
         Entity,
         (&Mesh, &Material, Option<&MaterialTextures>),
@@ -58,8 +59,7 @@ fn objects(world: &mut World) -> (Vec<SceneObject>, Entities) {
         (lights_frames, scale),
     ) in query.iter(world)
     {
-        // An unlit surface, such as a sky dome, neither takes light nor blocks it, as in a frame.
-        if hidden.contains(&entity) || material.unlit || has_dynamic_ancestor(world, parent) {
+        if !baked.contains(&entity) {
             continue;
         }
         let (mesh, textures) = UnwrappedFrom::read(unwrapped, mesh, textures);
@@ -101,28 +101,23 @@ fn lights(world: &mut World) -> Vec<PlacedLight> {
     lights.into_iter().map(|(_, light)| light).collect()
 }
 
-/// The vertices of everything that moves, or `None` if nothing does.
+/// The vertices of everything that moves and is lit, or `None` if nothing is.
 fn moving(world: &mut World) -> Option<Vec<DVec3>> {
     let hidden = hidden_entities(world);
-    let mut query =
-        world.query::<(Entity, &Mesh, Option<&GlobalTransform>, Has<DynamicObject>, Option<&ChildOf>)>();
-    let shown = query.iter(world).filter(|object| !hidden.contains(&object.0));
-    let moving = shown.filter(|(.., dynamic, parent)| *dynamic || has_dynamic_ancestor(world, *parent));
+    let mut query = world.query::<(
+        Entity,
+        &Mesh,
+        Option<&GlobalTransform>,
+        Option<&Material>,
+        Has<DynamicObject>,
+        Option<&ChildOf>,
+    )>();
+    let is_lit = |material: Option<&Material>| material.is_none_or(|material| !material.unlit);
+    let lit = query.iter(world).filter(|object| !hidden.contains(&object.0) && is_lit(object.3));
+    let moving = lit.filter(|(.., dynamic, parent)| *dynamic || has_dynamic_ancestor(world, *parent));
     moving.fold(None, |points, (_, mesh, transform, ..)| {
         let mut points = points.unwrap_or_default();
         points.extend(world_points(&transform.copied().unwrap_or_default().0, &mesh.0));
         Some(points)
     })
-}
-
-/// Whether `parent` or one of its ancestors is a dynamic object, so that its descendants move with it.
-fn has_dynamic_ancestor(world: &World, parent: Option<&ChildOf>) -> bool {
-    let mut ancestor = parent.map(ChildOf::parent);
-    while let Some(entity) = ancestor {
-        if world.get::<DynamicObject>(entity).is_some() {
-            return true;
-        }
-        ancestor = world.get::<ChildOf>(entity).map(ChildOf::parent);
-    }
-    false
 }

@@ -1,6 +1,7 @@
 //! The static scene in the form that the baker computes with: triangles in one space, their materials, and the layout
 //! of their lightmap texels. `from_world` reads it once from the World; nothing here writes to the World.
 
+mod baked_meshes;
 mod box_tree;
 pub(crate) mod crossings;
 mod duplicates;
@@ -24,6 +25,7 @@ mod triangles;
 pub(crate) use crossings::Face;
 pub(crate) use material::{ShownTexels, Side, SurfaceMaterial, reflectance_as_metal};
 
+pub use baked_meshes::baked_meshes;
 pub(crate) use from_world::{Entities, from_world};
 pub(crate) use layouter::{Layouter, density_of};
 pub(crate) use lightmap_layout::{LightmapLayout, MapLayout};

@@ -19,7 +19,7 @@ pub struct PlacedPrimitive {
     /// The mesh, in metres in its local space. It keeps its `uv1` as lightmap coordinates if they lie in [0, 1] without
     /// overlaps; otherwise it is unwrapped.
     pub mesh: Arc<TriangleMesh>,
-    /// Its reflectance, emission and opacity.
+    /// Its reflectance, emission and opacity. An unlit one absorbs all light; a World's unlit meshes are left out instead.
     pub material: Material,
     /// Images that the material's factors are multiplied by.
     pub textures: Option<MaterialTextures>,

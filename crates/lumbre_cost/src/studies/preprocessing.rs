@@ -4,13 +4,10 @@
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, Samples};
+use lumbre_bake::{BakeOptions, Samples, baked_meshes};
 use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
-use lumbre_scene::{
-    ChildOf, EmissiveLight, GlobalTransform, Mesh, Name, SceneSettings, StaticObject, Transform,
-    hidden_entities,
-};
+use lumbre_scene::{ChildOf, EmissiveLight, GlobalTransform, Mesh, Name, SceneSettings, Transform};
 
 use super::bake::{ERROR, QUICK_ERROR, quick_reference_seconds, reference_time, texels_of_room};
 use super::over_scenes;
@@ -367,8 +364,8 @@ fn best_ambient(alone: &Picture, under_one: &Picture, reference: &Picture) -> Ve
 /// Moves the smallest static object that does not shine along x by a fraction of its longest side, and
 /// returns its name, or `None` if there is none.
 fn moved(world: &mut World) -> Option<String> {
-    let hidden = hidden_entities(world);
-    let mut objects = world.query_filtered::<(Entity, &Mesh, &GlobalTransform, &Material), (With<StaticObject>, With<Transform>, Without<EmissiveLight>)>();
+    let baked = baked_meshes(world);
+    let mut objects = world.query_filtered::<(Entity, &Mesh, &GlobalTransform, &Material), (With<Transform>, Without<EmissiveLight>)>();
     let side = |mesh: &Mesh, place: &GlobalTransform| {
         let corners = mesh.0.positions.iter().map(|point| place.0.transform_point3(point.as_dvec3()));
         let (low, high) = corners
@@ -377,7 +374,7 @@ fn moved(world: &mut World) -> Option<String> {
     };
     let candidates = objects
         .iter(world)
-        .filter(|(entity, .., material)| !hidden.contains(entity) && material.front.emission == Vec3::ZERO)
+        .filter(|(entity, .., material)| baked.contains(entity) && material.front.emission == Vec3::ZERO)
         .map(|(entity, mesh, place, _)| (entity, side(mesh, place)))
         .filter(|(_, side)| side.is_finite() && *side > 0.0);
     let (entity, side) = candidates.min_by(|a, b| a.1.total_cmp(&b.1))?;

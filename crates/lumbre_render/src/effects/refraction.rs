@@ -338,7 +338,7 @@ impl Refraction {
             context.pass.set_pipeline(pipeline);
             context.pass.set_bind_group(0, &view, &[]);
             let is_drawn = |surface: &&RefractorSurface| {
-                surface.shape != RefractiveShape::Sheet && surface.mirrored == mirrored
+                surface.shape == RefractiveShape::Body && surface.mirrored == mirrored
             };
             for surface in self.surfaces.iter().filter(is_drawn) {
                 context.user.draw_shape(context.pass, surface.slot, &SHAPE);

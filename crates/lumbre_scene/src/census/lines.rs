@@ -167,7 +167,7 @@ impl Census {
             ),
             scene("fog", self.fog, "the scene has fog", "the scene has no fog"),
             mesh("dynamic objects", self.dynamic_objects, "marked as moving", "nothing moves"),
-            mesh("static objects", self.static_objects, "for the baker", "no mesh is static"),
+            mesh("static objects", self.static_objects, "for the baker", "no lit mesh is static"),
         ]
     }
 }

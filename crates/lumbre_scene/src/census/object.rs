@@ -88,7 +88,8 @@ impl RefractiveShape {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Sheet, Self::Surface, Self::Body];
 
-    /// Returns that of a flat or curved object that is thin, as its [`Medium`] says, or not.
+    /// Returns that of an object that is thin, as its [`Medium`] says, or not. `flat` is whether it is flat and its
+    /// reflection can be drawn as a view of its own ([`ObjectTraits::planar_mirror`]).
     pub fn new(thin: bool, flat: bool) -> Self {
         match (thin, flat) {
             (true, _) => Self::Sheet,

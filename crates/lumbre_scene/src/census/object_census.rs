@@ -14,7 +14,7 @@ pub struct ObjectCensus {
     pub meshes: usize,
     /// Their triangles.
     pub triangles: usize,
-    /// Objects that the baker includes.
+    /// Static objects that are lit: those that the baker includes.
     pub static_objects: usize,
     /// Objects marked as moving.
     pub dynamic_objects: usize,
@@ -116,7 +116,7 @@ impl ObjectCensus {
         change(&mut self.refractive_triangles, if traits.refracts { triangles } else { 0 });
         for (counter, counts) in [
             (&mut self.meshes, true),
-            (&mut self.static_objects, traits.mobility == Mobility::Static),
+            (&mut self.static_objects, traits.mobility == Mobility::Static && !traits.unlit),
             (&mut self.dynamic_objects, traits.mobility == Mobility::Dynamic),
             (&mut self.lightmapped, by_lightmap),
             (&mut self.lightmapped_blended, by_lightmap && blended),

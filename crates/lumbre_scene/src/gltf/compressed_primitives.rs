@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use super::accessor_format::{Format, Reader};
 use super::buffer_view::range_of_view;
-use super::document::{Document, Primitive, extension};
+use super::document::{Document, Primitive, element, extension};
 use super::draco;
 use super::error::LoadProblem;
 use super::extensions::DracoPrimitive;
@@ -46,20 +46,31 @@ pub(crate) fn is_used(root: &Map<String, Value>) -> bool {
 /// Gives attributes accessors of their own where they share one but have different Draco data: what an accessor says of
 /// them (type and count) may be the same, and programs that remove duplicates then keep only one. Returns true if the
 /// JSON was changed.
-pub(crate) fn separate_accessors(patch: &mut Patch, document: &Document) -> Result<bool, LoadProblem> {
+pub(crate) fn separate_accessors(
+    patch: &mut Patch,
+    document: &Document,
+    budget: &mut Budget,
+) -> Result<bool, LoadProblem> {
     let mut origins: HashMap<usize, Origin> = HashMap::new();
     let mut is_changed = false;
     for (mesh, source) in document.meshes.iter().enumerate().filter(|_| cfg!(feature = "draco")) {
         for (index, primitive) in source.primitives.iter().enumerate() {
             let place = || format!("{}.primitives[{index}]", document.mesh_place(mesh));
             let Some(compressed) = compressed(primitive, place)? else { continue };
-            for Provided { accessor, attribute, .. } in provided(primitive, &compressed, &place())? {
+            let place = place();
+            for Provided { accessor, attribute, used_by } in provided(primitive, &compressed, &place)? {
+                element(&document.accessors, "accessors", accessor, || used_by)?;
                 let origin = (compressed.buffer_view, attribute.map(|(_, number)| number));
                 if *origins.entry(accessor).or_insert(origin) == origin {
                     continue;
                 }
-                // An accessor that is not there is reported where it is read.
-                let Some(copy) = patch.get(&place!["accessors", accessor]).cloned() else { continue };
+                if !is_changed {
+                    // A reference that leads nowhere must not lead to an accessor that is added.
+                    check_references(document)?;
+                }
+                let Some(shared) = patch.get(&place!["accessors", accessor]) else { continue };
+                budget.charge(1, shared.to_string().len(), || place.clone())?;
+                let copy = shared.clone();
                 let own = patch.push("accessors", copy);
                 origins.insert(own, origin);
                 let of_primitive = place!["meshes", mesh, "primitives", index];
@@ -75,7 +86,23 @@ pub(crate) fn separate_accessors(patch: &mut Patch, document: &Document) -> Resu
     Ok(is_changed)
 }
 
-/// Decodes all primitives that are compressed with Draco. No accessor may have two origins.
+/// Checks that the accessors of all primitives are there.
+fn check_references(document: &Document) -> Result<(), LoadProblem> {
+    for (mesh, source) in document.meshes.iter().enumerate() {
+        for (index, primitive) in source.primitives.iter().enumerate() {
+            let attributes = primitive.attributes.values().filter_map(Value::as_u64);
+            let attributes = attributes.map(|accessor| usize::try_from(accessor).unwrap_or(usize::MAX));
+            for accessor in attributes.chain(primitive.indices) {
+                let place = || format!("{}.primitives[{index}]", document.mesh_place(mesh));
+                element(&document.accessors, "accessors", accessor, place)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Decodes all primitives that are compressed with Draco. No accessor may have two origins: see
+/// [`separate_accessors`].
 pub(crate) fn decode(
     document: &Document,
     contents: &[Cow<'_, [u8]>],

@@ -118,7 +118,7 @@ fn read(bytes: &[u8], base: Base<'_>, options: &LoadOptions) -> Result<(Prepared
         document = Document::from_root(patch.root(), &mut notes)?;
     }
     if let Some(patch) = &mut patch
-        && compressed_primitives::separate_accessors(patch, &document)?
+        && compressed_primitives::separate_accessors(patch, &document, &mut budget)?
     {
         document = Document::from_root(patch.root(), &mut notes)?;
     }

@@ -1,7 +1,7 @@
 //! Reversible changes to the JSON of a file. A bake records in the file what it changes, so that the next
 //! bake can restore the artist's version first. What is changed is up to the callers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -16,7 +16,7 @@ const LISTS: [&str; 6] = ["accessors", "bufferViews", "buffers", "materials", "m
 const VERSION: u32 = 1;
 
 /// One step of a path: the name of an object member or the index of a list element.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum Key {
     Index(usize),
@@ -63,13 +63,15 @@ pub(crate) struct Patch {
     root: Value,
     lengths: BTreeMap<String, Option<usize>>,
     replaced: Vec<(Place, Option<Value>)>,
+    /// The places in `replaced`.
+    remembered: HashSet<Place>,
 }
 
 impl Patch {
     pub(crate) fn new(root: Map<String, Value>) -> Self {
         let root = Value::Object(root);
         let lengths = LISTS.iter().map(|&list| (list.to_owned(), length(&root, list))).collect();
-        Self { root, lengths, replaced: Vec::new() }
+        Self { root, lengths, replaced: Vec::new(), remembered: HashSet::new() }
     }
 
     /// The value at a path.
@@ -151,7 +153,7 @@ impl Patch {
             }
             _ => false,
         };
-        if !added && !self.replaced.iter().any(|(known, _)| known == place) {
+        if !added && self.remembered.insert(place.to_vec()) {
             self.replaced.push((place.to_vec(), former));
         }
     }

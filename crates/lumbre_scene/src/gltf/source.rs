@@ -78,7 +78,7 @@ impl SourceFile {
         if quadric_fallback::add(&mut patch, &document, &mut contents, &mut budget, &mut notes)? {
             document = Document::from_root(patch.root(), &mut notes)?;
         }
-        if compressed_primitives::separate_accessors(&mut patch, &document)? {
+        if compressed_primitives::separate_accessors(&mut patch, &document, &mut budget)? {
             document = Document::from_root(patch.root(), &mut notes)?;
         }
         let decoded = compressed::decode(&document, &contents, &mut budget)?;
