@@ -99,8 +99,10 @@ fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
     // A flat scene has no depth, but its coordinates must not overflow.
     let least = (1e-9 * bounds.radius()).max(1e-200);
     let size = (bounds.max - bounds.min).max(DVec3::splat(least));
-    // Maps the bounding box to [0, 1]³, so that one grid serves all directions.
-    let unit = DAffine3::from_scale(size.recip()) * DAffine3::from_translation(-bounds.min);
+    // Maps the bounding box to [0, 1]³, so that one grid serves all directions, and a flat one to its middle.
+    let unit = DAffine3::from_translation(DVec3::splat(0.5))
+        * DAffine3::from_scale(size.recip())
+        * DAffine3::from_translation(-bounds.center());
     let mut first = vec![[f64::INFINITY; GRID * GRID]; 6];
     let hidden = hidden_entities(world);
     let mut query = world.query::<(Entity, &Mesh, &GlobalTransform, Option<&Material>)>();
