@@ -13,7 +13,6 @@ use bevy_ecs::world::World;
 use lumbre::cost::Spread;
 use lumbre::optics::Shading;
 use lumbre::render::{FrameOptions, Gpu, Measure, Offscreen, OffscreenFormat, Renderer};
-use lumbre::scene::update_transforms;
 
 /// Pairs for which pipelines are made, and which do not count.
 const COLD: usize = 3;
@@ -45,7 +44,6 @@ fn main() -> anyhow::Result<()> {
     for file in &files {
         let mut world = World::new();
         lumbre::scene::load(&mut world, Path::new(file))?;
-        update_transforms(&mut world);
         for (name, options) in [("Phong", &phong), ("Phong, four samples", &samples), ("Gouraud", &gouraud)] {
             let [plain, measured] = times(&gpu, &mut world, options, size, pairs)?;
             let ratios: Vec<f64> = plain.iter().zip(&measured).map(|(one, other)| one / other).collect();

@@ -32,10 +32,10 @@ use crate::{BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Progres
 /// Configures and runs a bake, which computes the light on the static objects of a scene and stores it in lightmaps.
 ///
 /// [`Bake::run`] bakes the entities of a World that have a `Mesh` and a `StaticObject`, except hidden and unlit ones and
-/// those that are or are below a `DynamicObject` ([`baked_meshes`](crate::baked_meshes)). Light comes from emissive materials, from the sky, and from lights whose
-/// `BakeMode` is `Static` (direct light and bounces are baked) or `Mixed` (only the bounces are). After the bake each
-/// of these entities has a mesh with lightmap coordinates in `uv1`, and a `Lightmap` of E/π. The primitives of a glTF
-/// node share one map.
+/// those that are or are below a `DynamicObject` ([`baked_meshes`](crate::baked_meshes)). Light comes from emissive
+/// materials, from the sky, and from lights whose `BakeMode` is `Static` (direct light and bounces are baked) or `Mixed`
+/// (only the bounces are). After the bake each of these entities has a mesh with lightmap coordinates in `uv1`, and a
+/// `Lightmap` of E/π. The primitives of a glTF node share one map.
 ///
 /// If the bake fails or is cancelled, the World's meshes and lightmaps are unchanged; only global transforms have been
 /// updated.

@@ -94,5 +94,5 @@ pub use report::{
     BakeReport, Ended, ErrorAtTime, ErrorPart, ProbeReport, RebakeReport, ResolutionReport, SeamReport,
     StageTime, WorstPlace,
 };
-pub use scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, baked_meshes};
+pub use scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, baked_area, baked_meshes};
 pub use unwrapped_from::UnwrappedFrom;

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{
-    Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, baked_meshes,
+    Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors, baked_area, baked_meshes,
     has_light_to_bake,
 };
 use lumbre_optics::Material;
-use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, MaterialTextures, Mesh};
+use lumbre_scene::{Lightmap, LightmapImage, MaterialTextures, Mesh};
 
 use crate::converged::Maps;
 use crate::picture::Picture;
@@ -36,7 +36,7 @@ pub fn bake_options(
     texels: f64,
 ) -> Result<BakeOptions, CostError> {
     let mut world = scene.open(conditions.aspect())?;
-    let area = static_area(&mut world);
+    let area = baked_area(&mut world);
     // Two digits are accurate enough, and keep the command line short.
     let exact = (texels / area.max(1e-12)).sqrt();
     let unit = 10f64.powf(exact.log10().floor() - 1.0);
@@ -74,7 +74,7 @@ pub fn nothing_to_bake(conditions: &Conditions<'_>, scene: &SceneFile) -> Result
 
 /// Returns a sentence that says why a World of this name cannot be baked, or `None` if it can.
 pub fn nothing_to_bake_in(world: &mut World, name: &str) -> Option<String> {
-    match (static_area(world) > 0.0, has_light_to_bake(world)) {
+    match (baked_area(world) > 0.0, has_light_to_bake(world)) {
         (true, true) => None,
         (false, _) => {
             Some(format!("Everything in {name} moves, is hidden or is unlit, so there is nothing to bake."))
@@ -109,27 +109,6 @@ pub fn few_bakes(conditions: &Conditions<'_>, scene: &SceneFile) -> Result<Optio
             scene.name
         )
     }))
-}
-
-/// Returns the area of everything that is baked, in square metres.
-fn static_area(world: &mut World) -> f64 {
-    let baked = baked_meshes(world);
-    let mut objects = world.query::<(Entity, &Mesh, &GlobalTransform)>();
-    let area = |(_, mesh, place): (Entity, &Mesh, &GlobalTransform)| {
-        let corner = |index: u32| {
-            let point = mesh.0.positions.get(index as usize).copied().unwrap_or(Vec3::ZERO);
-            place.0.transform_point3(point.as_dvec3())
-        };
-        let triangles = mesh.0.indices.as_chunks::<3>().0.iter();
-        triangles
-            .map(|triangle| {
-                let [a, b, c] = triangle.map(corner);
-                0.5 * (b - a).cross(c - a).length()
-            })
-            .filter(|area| area.is_finite())
-            .sum::<f64>()
-    };
-    objects.iter(world).filter(|(entity, ..)| baked.contains(entity)).map(area).sum()
 }
 
 /// Bakes a scene. `told` are the fractions of the study that are done before and after.

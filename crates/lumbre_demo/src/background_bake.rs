@@ -15,11 +15,11 @@ use std::time::{Duration, Instant};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use lumbre_bake::{
-    Bake, BakeOptions, BakeReport, CancelToken, Density, Quality, baked_meshes, has_light_to_bake,
+    Bake, BakeOptions, BakeReport, CancelToken, Density, Quality, baked_area, has_light_to_bake,
 };
 use lumbre_scene::{
-    GlobalTransform, IrradianceVolume, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh, Name,
-    PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, Transform, save_baked,
+    IrradianceVolume, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh, Name, PackedFormat,
+    Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, Transform, save_baked,
 };
 
 /// One of several bakes of increasing quality.
@@ -379,7 +379,7 @@ impl Job {
         if under_a_sky {
             world.get_resource_or_init::<SceneSettings>().sky = Vec3::splat(SKY);
         }
-        let area = area(&mut world);
+        let area = baked_area(&mut world);
         let first = FIRST.iter().map(|pass| (pass.name, rougher(&self.wanted, pass, area)));
         for (name, options) in first.chain([(FINAL, self.wanted)]) {
             if self.cancel.is_cancelled() {
@@ -428,24 +428,6 @@ fn rougher(wanted: &BakeOptions, pass: &Pass, area: f64) -> BakeOptions {
 fn leaving_a_core(options: BakeOptions) -> BakeOptions {
     let cores = thread::available_parallelism().map_or(1, |cores| (cores.get() - 1).max(1));
     BakeOptions { threads: options.threads.or(Some(cores)), ..options }
-}
-
-/// Returns the area of all meshes that are baked, in square metres.
-fn area(world: &mut World) -> f64 {
-    let baked = baked_meshes(world);
-    let mut meshes = world.query::<(Entity, &Mesh, &GlobalTransform)>();
-    let of_mesh = |(_, mesh, place): (Entity, &Mesh, &GlobalTransform)| {
-        let corner = |index: u32| {
-            let position = mesh.0.positions.get(index as usize).copied().unwrap_or_default();
-            place.0.transform_point3(position.as_dvec3())
-        };
-        let areas = mesh.0.triangles().map(|triangle| {
-            let [a, b, c] = triangle.map(corner);
-            0.5 * (b - a).cross(c - a).length()
-        });
-        areas.filter(|area| area.is_finite()).sum::<f64>()
-    };
-    meshes.iter(world).filter(|(entity, ..)| baked.contains(entity)).map(of_mesh).sum()
 }
 
 #[cfg(test)]

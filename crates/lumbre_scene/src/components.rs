@@ -149,8 +149,8 @@ pub struct SeparateLight {
     pub bounced: Arc<LightmapImage>,
 }
 
-/// Marks an entity that never moves, so that the baker includes it and lights it unless it is unlit. The importer sets it on
-/// every mesh that is not below a [`DynamicObject`].
+/// Marks an entity that never moves, so that the baker includes it and lights it unless it is unlit. The
+/// importer sets it on every mesh that is not below a [`DynamicObject`].
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StaticObject;
 

@@ -73,12 +73,17 @@ fn sharing_an_accessor() -> (File, std::sync::Arc<lumbre_mesh::TriangleMesh>) {
 #[test]
 fn attributes_that_share_an_accessor_have_their_own_draco_data() {
     let _alone = MEASURING.lock();
-    let (file, alone) = sharing_an_accessor();
+    let (mut file, alone) = sharing_an_accessor();
     assert!(alone.normals != alone.positions);
+    // A second primitive with the same data is not decoded again.
+    let primitives = file.root["meshes"][0]["primitives"].as_array_mut().unwrap();
+    primitives.push(primitives[0].clone());
     let (mut shared, _) = file.load().unwrap();
-    let shared = the_mesh(&mut shared);
-    assert_eq!((&shared.positions, &shared.normals), (&alone.positions, &alone.normals));
-    assert_eq!((&shared.uv0, &shared.indices), (&alone.uv0, &alone.indices));
+    let meshes: Vec<_> = shared.query::<&Mesh>().iter(&shared).map(|mesh| mesh.0.clone()).collect();
+    let [mesh, second] = &meshes[..] else { panic!("{} meshes", meshes.len()) };
+    assert!(std::sync::Arc::ptr_eq(mesh, second));
+    assert_eq!((&mesh.positions, &mesh.normals), (&alone.positions, &alone.normals));
+    assert_eq!((&mesh.uv0, &mesh.indices), (&alone.uv0, &alone.indices));
 }
 
 #[test]

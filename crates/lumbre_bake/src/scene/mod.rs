@@ -25,7 +25,7 @@ mod triangles;
 pub(crate) use crossings::Face;
 pub(crate) use material::{ShownTexels, Side, SurfaceMaterial, reflectance_as_metal};
 
-pub use baked_meshes::baked_meshes;
+pub use baked_meshes::{baked_area, baked_meshes};
 pub(crate) use from_world::{Entities, from_world};
 pub(crate) use layouter::{Layouter, density_of};
 pub(crate) use lightmap_layout::{LightmapLayout, MapLayout};

@@ -14,7 +14,7 @@
 //! Light is added triangle by triangle, or, of surfaces with many triangles, pixel by pixel (`rendering_path` chooses):
 //! then their visible front faces are drawn first, and each surface's light is added over its part of the frame.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use bevy_ecs::world::World;
 use glam::Vec3;
@@ -268,47 +268,34 @@ impl Refraction {
 
     /// Returns the keys of all pipelines that frames of the scene may need.
     fn keys_of_scene(&self, target: LitTarget) -> Vec<Key> {
-        let mut keys = self.keys_of_faces(self.shapes.contains(&RefractiveShape::Body), self.by_pixel);
+        let up_to = |last: bool| [false, true].into_iter().take(1 + usize::from(last));
+        let mut keys = keys_of_faces(self.shapes.contains(&RefractiveShape::Body), self.by_pixel);
         for &shape in &self.shapes {
             // A curved reflection has no picture, and that of a flat surface may have to be left out.
-            let has_picture = shape != RefractiveShape::Body && self.has_mirrors;
-            for pictured in [false, true].into_iter().filter(|pictured| has_picture || !pictured) {
-                let from_front_faces =
-                    [false, true].into_iter().filter(|by_pixel| self.by_pixel || !by_pixel);
-                keys.extend(from_front_faces.map(|by_pixel| Key::Surfaces {
-                    target,
-                    shape,
-                    pictured,
-                    from_front_faces: by_pixel,
-                }));
+            for pictured in up_to(shape != RefractiveShape::Body && self.has_mirrors) {
+                for from_front_faces in up_to(self.by_pixel) {
+                    keys.push(Key::Surfaces { target, shape, pictured, from_front_faces });
+                }
             }
         }
         keys
     }
 
     /// Returns the keys of the pipelines that draw this frame's surfaces, given the views in its mirrors.
-    fn keys_of_frame(&self, target: LitTarget, mirrors: &[MirrorShape]) -> HashSet<Key> {
-        let seen = mirrors.iter().filter(|view| view.parent == 0).flat_map(|view| &view.surfaces);
-        let pictured: HashSet<usize> =
-            seen.filter(|mirror| mirror.refracts).map(|mirror| mirror.slot).collect();
+    fn keys_of_frame(&self, target: LitTarget, mirrors: &[MirrorShape]) -> Vec<Key> {
+        let pictured = || {
+            let seen = mirrors.iter().filter(|view| view.parent == 0).flat_map(|view| &view.surfaces);
+            seen.filter(|mirror| mirror.refracts).map(|mirror| mirror.slot)
+        };
         let by_pixel = self.surfaces_by(true).next().is_some();
-        let mut keys: HashSet<Key> = self.keys_of_faces(self.has_bodies(), by_pixel).into_iter().collect();
+        let mut keys = keys_of_faces(self.has_bodies(), by_pixel);
         for from_front_faces in [false, true] {
-            let surfaces = self.surfaces_by(from_front_faces);
-            keys.extend(surfaces.map(|(_, RefractorSurface { shape, slot, .. })| Key::Surfaces {
-                target,
-                shape: *shape,
-                pictured: pictured.contains(slot),
-                from_front_faces,
-            }));
+            for (_, RefractorSurface { shape, slot, .. }) in self.surfaces_by(from_front_faces) {
+                let (shape, pictured) = (*shape, pictured().any(|mirror| mirror == *slot));
+                keys.push(Key::Surfaces { target, shape, pictured, from_front_faces });
+            }
         }
         keys
-    }
-
-    fn keys_of_faces(&self, back: bool, front: bool) -> Vec<Key> {
-        let back_faces = [false, true].map(|mirrored| Key::BackFaces { mirrored });
-        let back_faces = back_faces.into_iter().filter(|_| back);
-        back_faces.chain(front.then_some(Key::FrontFaces)).collect()
     }
 
     /// Returns true if any surface in view is that of a body.
@@ -397,6 +384,12 @@ impl Refraction {
         }
         Ok(())
     }
+}
+
+/// Returns the keys of the pipelines that draw back and front faces, where these are needed.
+fn keys_of_faces(back: bool, front: bool) -> Vec<Key> {
+    let back_faces = [false, true].into_iter().filter(|_| back).map(|mirrored| Key::BackFaces { mirrored });
+    back_faces.chain(front.then_some(Key::FrontFaces)).collect()
 }
 
 /// Copies whole textures to others of the same size.

@@ -52,7 +52,8 @@ pub(crate) fn separate_accessors(
     budget: &mut Budget,
 ) -> Result<bool, LoadProblem> {
     let mut origins: HashMap<usize, Origin> = HashMap::new();
-    let mut is_changed = false;
+    // Primitives that differ only in their material share the added accessors, too.
+    let mut added: HashMap<(usize, Origin), usize> = HashMap::new();
     for (mesh, source) in document.meshes.iter().enumerate().filter(|_| cfg!(feature = "draco")) {
         for (index, primitive) in source.primitives.iter().enumerate() {
             let place = || format!("{}.primitives[{index}]", document.mesh_place(mesh));
@@ -64,26 +65,32 @@ pub(crate) fn separate_accessors(
                 if *origins.entry(accessor).or_insert(origin) == origin {
                     continue;
                 }
-                if !is_changed {
+                if added.is_empty() {
                     // A reference that leads nowhere must not lead to an accessor that is added.
                     check_references(document)?;
                 }
-                let Some(shared) = patch.get(&place!["accessors", accessor]) else { continue };
-                budget.charge(1, shared.to_string().len(), || place.clone())?;
-                let copy = shared.clone();
-                let own = patch.push("accessors", copy);
-                origins.insert(own, origin);
+                let own = match added.get(&(accessor, origin)) {
+                    Some(&own) => own,
+                    None => {
+                        let Some(shared) = patch.get(&place!["accessors", accessor]).cloned() else {
+                            continue;
+                        };
+                        budget.charge(1, shared.to_string().len(), || place.clone())?;
+                        let own = patch.push("accessors", shared);
+                        added.insert((accessor, origin), own);
+                        own
+                    }
+                };
                 let of_primitive = place!["meshes", mesh, "primitives", index];
                 let reference: &[Key] = match attribute {
                     Some((name, _)) => &place!["attributes", name],
                     None => &place!["indices"],
                 };
                 patch.set(&[&of_primitive[..], reference].concat(), own.into());
-                is_changed = true;
             }
         }
     }
-    Ok(is_changed)
+    Ok(!added.is_empty())
 }
 
 /// Checks that the accessors of all primitives are there.
