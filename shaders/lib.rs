@@ -2,7 +2,7 @@
 //! caller; nothing here depends on a device.
 //!
 //! ```text
-//!   g_buffer, deferred_lighting                                  deferred shading of the same surfaces
+//!   g_buffer, deferred_lighting, deferred_composite              deferred shading of the same surfaces
 //!      ▼
 //!   forward ──► lighting, light_clusters, lightmap, textures …   the passes of lumbre_render
 //!      │           └──► optics/…                                 the equations; f64 twins in lumbre_optics
@@ -33,6 +33,7 @@ macro_rules! modules {
 }
 
 modules!(
+    "deferred_composite",
     "deferred_lighting",
     "depth_plane",
     "display",
@@ -56,6 +57,7 @@ modules!(
     "shadows",
     "shared_records",
     "shared_records_probe",
+    "surface_bits",
     "surface_maps",
     "tone_curve",
     "optics/ambient_cube",

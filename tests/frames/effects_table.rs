@@ -264,6 +264,17 @@ const ROWS: &[Row] = &[
         add: |scene| scene.options.rendering_path = RenderingPath::Deferred,
     },
     Row {
+        effect: "deferred shading in compute shaders",
+        called_for_by: "`RenderingPath::DeferredCompute`; by itself on a GPU where shading is deferred (here against \
+                        `RenderingPath::Deferred`)",
+        features: &["IN_COMPUTE"],
+        before: |scene| {
+            spawn(scene, ranged(Light::point(Vec3::splat(9.0))));
+            scene.options.rendering_path = RenderingPath::Deferred;
+        },
+        add: |scene| scene.options.rendering_path = RenderingPath::DeferredCompute,
+    },
+    Row {
         effect: "shadows",
         called_for_by: "a light with `shadow` (here a spot light)",
         features: &["SHADOWS"],
@@ -849,8 +860,9 @@ fn line(row: &Row) -> String {
     let effect = draw(&mut renderer, &mut with);
     // Lists of lights and deferred shading lead to the same picture in another way, and counting does not change
     // it.
-    let same_picture =
-        ["CLUSTERS", "COUNT_LIGHTS", "DEFERRED"].iter().any(|feature| row.features.contains(feature));
+    let same_picture = ["CLUSTERS", "COUNT_LIGHTS", "DEFERRED", "IN_COMPUTE"]
+        .iter()
+        .any(|feature| row.features.contains(feature));
     let shown = effect.bytes != plain.bytes || same_picture;
     assert!(shown, "{}: the scene does not show it", row.effect);
     // What remains of the effect in a renderer that has drawn it, and in one that has it but never drew it.

@@ -185,6 +185,23 @@ fn lists_of_objects_count_what_is_in_them() {
     assert_eq!(tested(counted(&mut world, &options(LightLists::Everything))), PIXELS * (lights + 3));
 }
 
+/// The pixels of the G-buffer count the same in fragments and in compute shaders.
+#[test]
+fn compute_shaders_count_what_fragments_count() {
+    for lists in [LightLists::Clusters, LightLists::Objects] {
+        let (mut world, wall) = wall(glossy());
+        lamps(&mut world, 2.0);
+        let by = |rendering_path| FrameOptions { rendering_path, ..counting(lists, Shading::Phong) };
+        let [_, fragments, _] = counted(&mut world, &by(RenderingPath::Deferred));
+        assert!(fragments.tested > PIXELS && fragments.contributing > PIXELS / 20, "{fragments:?}");
+        let [_, computed, _] = counted(&mut world, &by(RenderingPath::DeferredCompute));
+        assert_eq!(computed.tested, fragments.tested, "{lists:?}");
+        let apart = computed.contributing.abs_diff(fragments.contributing);
+        assert!(apart <= fragments.contributing / 1000, "{lists:?}: {computed:?}, {fragments:?}");
+        world.despawn(wall);
+    }
+}
+
 #[test]
 fn clusters_count_the_entries_of_their_lists() {
     // With ranges that reach all of the wall, each list has every light, and an odd number of inverse-square

@@ -119,7 +119,8 @@ fn every_shading_and_every_list_agrees_with_the_twin() {
     for shading in Shading::ALL {
         let expected = expected(&mut world, *shading);
         for light_lists in [LightLists::Everything, LightLists::Objects, LightLists::Clusters] {
-            for rendering_path in [RenderingPath::Forward, RenderingPath::Deferred] {
+            let deferred = [RenderingPath::Deferred, RenderingPath::DeferredCompute];
+            for rendering_path in [RenderingPath::Forward].into_iter().chain(deferred) {
                 let options =
                     FrameOptions { shading: Some(*shading), light_lists, rendering_path, ..linear() };
                 let difference = compare(&got(&mut world, &options), &expected);

@@ -1,5 +1,5 @@
 //! Compares frames with deferred shading with the same frames in forward shading: the same up to rounding, for any
-//! contents and order of drawing.
+//! contents and order of drawing. Compute shaders draw what fragments draw.
 
 use std::sync::Arc;
 
@@ -10,8 +10,8 @@ use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{AlphaMode, BakeMode, Fog, FogMode, Light, Material, Shading, SpotCone, Surface};
 use lumbre_render::effects::{Board, BuiltIn, Effect, FrameGraph, Stage};
 use lumbre_render::{
-    FrameOptions, FrameReport, LightLists, Measure, Offscreen, OffscreenFormat, Renderer, RenderingPath,
-    SceneFacts, Viewport,
+    Display, FrameOptions, FrameReport, LightLists, Measure, Offscreen, OffscreenFormat, Renderer,
+    RenderingPath, SceneFacts, Viewport,
 };
 use lumbre_scene::{
     AmbientCube, Camera, DynamicObject, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
@@ -28,6 +28,10 @@ use crate::adapter::{Canvas, draw, gpu, linear};
 const ROUNDING: f64 = 6e-5;
 /// The same where textures or vertex colours modulate light: they are stored with a relative error of 2^-13.
 const TINTED: f64 = 1.22e-4 + ROUNDING;
+
+/// The largest accepted difference between light of compute shaders and of fragments, which evaluate the same
+/// expressions: that of two compilations, of which a processor's fragments load records for each other.
+const BETWEEN_STAGES: f64 = 1e-5;
 
 const SIZE: (u32, u32) = (131, 83);
 
@@ -46,13 +50,20 @@ fn largest_difference(expected: &[DVec3], got: &[DVec3]) -> f64 {
     expected.iter().zip(got).zip(allowed).map(of).fold(0.0, f64::max)
 }
 
-/// Returns the difference of both paths, and the report of the deferred frame.
+/// Returns the difference of forward and deferred shading, and the report of the deferred frame. Fails unless compute
+/// shaders light the same.
 fn difference(world: &mut World, options: &FrameOptions) -> (f64, FrameReport) {
     let with = |rendering_path| FrameOptions { rendering_path, ..options.clone() };
     let (expected, forward) = draw(world, SIZE.0, SIZE.1, &with(RenderingPath::Forward));
     let (got, deferred) = draw(world, SIZE.0, SIZE.1, &with(RenderingPath::Deferred));
+    let (computed, in_compute) = draw(world, SIZE.0, SIZE.1, &with(RenderingPath::DeferredCompute));
     assert!(!forward.plan.status("g-buffer").unwrap().runs());
     assert!(deferred.plan.status("g-buffer").unwrap().runs());
+    assert!(deferred.plan.status("deferred lighting").is_none());
+    assert!(in_compute.plan.status("deferred lighting").unwrap().runs());
+    assert_eq!(deferred.statistics.draws, in_compute.statistics.draws);
+    let apart = largest_difference(&got, &computed);
+    assert!(apart <= BETWEEN_STAGES, "in compute shaders: {apart}");
     (largest_difference(&expected, &got), deferred)
 }
 
@@ -284,8 +295,10 @@ fn what_a_program_draws_behind_everything_hides_the_same() {
         pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect::<Vec<_>>()
     };
     let forward = drawn(RenderingPath::Forward, true);
-    let apart = largest_difference(&forward, &drawn(RenderingPath::Deferred, true));
-    assert!(apart < ROUNDING, "{apart}");
+    for path in [RenderingPath::Deferred, RenderingPath::DeferredCompute] {
+        let apart = largest_difference(&forward, &drawn(path, true));
+        assert!(apart < ROUNDING, "{path:?}: {apart}");
+    }
     assert!(largest_difference(&forward, &drawn(RenderingPath::Forward, false)) > 0.1, "nothing is hidden");
 }
 
@@ -330,8 +343,10 @@ fn a_light_that_is_left_out_is_missed() {
     let lamps: Vec<Entity> = world.query_filtered::<Entity, With<Light>>().iter(&world).collect();
     let lamp = lamps[2];
     world.get_mut::<Light>(lamp).unwrap().enabled = false;
-    let (got, _) = draw(&mut world, SIZE.0, SIZE.1, &by(RenderingPath::Deferred));
-    assert!(largest_difference(&expected, &got) > 100.0 * ROUNDING);
+    for path in [RenderingPath::Deferred, RenderingPath::DeferredCompute] {
+        let (got, _) = draw(&mut world, SIZE.0, SIZE.1, &by(path));
+        assert!(largest_difference(&expected, &got) > 100.0 * ROUNDING);
+    }
 }
 
 #[test]
@@ -361,6 +376,9 @@ fn automatic_is_deferred_under_many_lights() {
     let explained = Renderer::new(gpu()).explain(&mut world, &auto, 40, 30).unwrap();
     let pass = explained.frame.passes.iter().find(|pass| pass.name == "g-buffer").unwrap();
     assert!(pass.group.is_some());
+    // A GPU lights in compute shaders, a processor in fragments.
+    let in_compute = explained.frame.passes.iter().any(|pass| pass.name == "deferred lighting");
+    assert_eq!(in_compute, !gpu().is_software());
     let path = |explained: lumbre_render::SceneExplanation| explained.rendering_path;
     assert!(path(explained).starts_with("deferred"));
     // Without a device that of a GPU.
@@ -392,12 +410,14 @@ fn a_part_of_a_target_and_what_mirrors_show_are_the_same() {
     };
     for viewport in [None, Some(Viewport::new([17, 9], [60, 41]))] {
         let (expected, _) = drawn(RenderingPath::Forward, viewport);
-        let (got, report) = drawn(RenderingPath::Deferred, viewport);
-        assert!(report.plan.status("g-buffer").unwrap().runs());
-        assert_eq!(report.statistics.mirror_views, 1);
-        let apart = expected.iter().zip(&got).map(|(a, b)| a.abs_diff(*b)).max();
-        println!("{viewport:?}: {apart:?} of 255");
-        assert!(apart <= Some(1), "{viewport:?}: {apart:?}");
+        for path in [RenderingPath::Deferred, RenderingPath::DeferredCompute] {
+            let (got, report) = drawn(path, viewport);
+            assert!(report.plan.status("g-buffer").unwrap().runs());
+            assert_eq!(report.statistics.mirror_views, 1);
+            let apart = expected.iter().zip(&got).map(|(a, b)| a.abs_diff(*b)).max();
+            println!("{viewport:?}, {path:?}: {apart:?} of 255");
+            assert!(apart <= Some(1), "{viewport:?}, {path:?}: {apart:?}");
+        }
     }
     // A renderer without the G-buffer lights every surface where it is drawn.
     let frame = Offscreen::new(gpu(), 48, 32, OffscreenFormat::Rgba8).unwrap();
@@ -414,10 +434,37 @@ fn frames_that_change_their_path_and_their_light_stay_right() {
     let lamps: Vec<Entity> = world.query_filtered::<Entity, With<Light>>().iter(&world).collect();
     for (number, lamp) in lamps.into_iter().enumerate().step_by(3) {
         world.get_mut::<Light>(lamp).unwrap().enabled = false;
-        let [forward, deferred] = [RenderingPath::Forward, RenderingPath::Deferred].map(by);
-        let order = if number % 2 == 0 { [&forward, &deferred] } else { [&deferred, &forward] };
-        let [a, b] = order.map(|options| canvas.draw(&mut world, options).0);
-        let apart = largest_difference(&a, &b).max(largest_difference(&b, &a));
-        assert!(apart < ROUNDING, "after {number} lamps: {apart}");
+        let mut paths =
+            [RenderingPath::Forward, RenderingPath::Deferred, RenderingPath::DeferredCompute].map(by);
+        paths.rotate_left(number % 3);
+        let [a, b, c] = paths.each_ref().map(|options| canvas.draw(&mut world, options).0);
+        for [one, other] in [[&a, &b], [&b, &c], [&c, &a]] {
+            let apart = largest_difference(one, other);
+            assert!(apart < ROUNDING, "after {number} lamps: {apart}");
+        }
+    }
+}
+
+/// Eight bits, which the lit shaders have converted themselves and the composite passes on, or the display pass from a
+/// linear frame.
+#[test]
+fn compute_shaders_write_what_each_target_takes() {
+    let mut world = room(perspective());
+    for display in [Display::Srgb, Display::Clamp, Display::Linear] {
+        for probe in [false, true] {
+            let mut drawn = |rendering_path| {
+                let frame = Offscreen::new(gpu(), SIZE.0, SIZE.1, OffscreenFormat::Rgba8).unwrap();
+                let options = FrameOptions { display, probe, ..by(rendering_path) };
+                let report = Renderer::new(gpu()).render(&mut world, &frame.target(), &options).unwrap();
+                // The probe needs the linear frame, which the display pass then converts.
+                assert_eq!(report.plan.status("display").unwrap().runs(), probe);
+                frame.read_rgba8(gpu()).unwrap()
+            };
+            let fragments = drawn(RenderingPath::Deferred);
+            let computed = drawn(RenderingPath::DeferredCompute);
+            let apart = fragments.iter().zip(&computed).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(fragments.iter().any(|value| (60..200).contains(value)));
+            assert!(apart <= Some(1), "{display:?}, {probe}: {apart:?}");
+        }
     }
 }

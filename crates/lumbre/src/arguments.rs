@@ -566,10 +566,10 @@ pub struct Frame {
     /// Filter highlights within pixels under Phong shading, or not, instead of as the file says.
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     pub specular_antialiasing: Option<bool>,
-    /// Light opaque surfaces as they are drawn (forward) or afterwards from a G-buffer (deferred). auto (the
-    /// default) chooses deferred where many lights meet small triangles. The picture is the same but for a few pixels
-    /// of glass.
-    #[arg(long, value_name = "auto|forward|deferred", value_parser = rendering_path)]
+    /// Light opaque surfaces as they are drawn (forward) or afterwards from a G-buffer, in fragments (deferred) or in
+    /// compute shaders (deferred-compute). auto (the default) chooses deferred where many lights meet small triangles,
+    /// and deferred-compute there on a GPU. The picture is the same but for a few pixels of glass.
+    #[arg(long, value_name = "auto|forward|deferred|deferred-compute", value_parser = rendering_path)]
     pub rendering_path: Option<RenderingPath>,
     /// Conversion from radiance to pixel values: srgb for viewing (the default for PNG), linear for unchanged
     /// radiance (for EXR), clamp as OpenGL does.

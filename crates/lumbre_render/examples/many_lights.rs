@@ -2,7 +2,7 @@
 //! under point lights of three metres.
 //! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720]
 //! [--shading phong|auto:0.01] [--reflection blinn] [--kind point|spot|unbounded]
-//! [--lists auto|objects|clusters|everything] [--path auto|forward|deferred] [--png FOLDER] [--account]
+//! [--lists auto|objects|clusters|everything] [--path auto|forward|deferred|deferred-compute] [--png FOLDER] [--account]
 //! [LIGHTS …]`
 //!
 //! Times are wall-clock times from the call until the device has finished. Printed are the median and the
@@ -79,8 +79,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 }
             }
             "--path" => {
-                options.rendering_path =
-                    RenderingPath::from_name(&value()?).ok_or("--path takes auto, forward or deferred")?;
+                options.rendering_path = RenderingPath::from_name(&value()?)
+                    .ok_or("--path takes auto, forward, deferred or deferred-compute")?;
             }
             "--png" => png = Some(value()?),
             "--account" => account = true,

@@ -9,7 +9,7 @@ use lumbre_scene::{ObjectTraits, SceneSettings};
 
 use crate::extract::{CameraView, LitPass, Object, Objects, Window};
 use crate::features::{self, FrameFeatures};
-use crate::g_buffer::{self, DeferredVariants, GBufferContents};
+use crate::g_buffer::{self, DeferredVariants, GBufferContents, LitClass};
 use crate::irradiance_volumes::IrradianceVolumes;
 use crate::layout::InstanceData;
 use crate::light_lists::ObjectLightLists;
@@ -375,6 +375,16 @@ impl Draws {
     /// Returns the classes that a pass lights from the G-buffer, with their numbers.
     pub fn deferred_of(&self, pass: LitPass) -> impl Iterator<Item = (u32, &DeferredClass)> {
         (1..).zip(&self.deferred).filter(move |(_, class)| class.pass == pass)
+    }
+
+    /// Returns what compute shaders light, in the order of the numbers, in a frame of this size.
+    pub fn lit_classes(&self, size: [u32; 2]) -> impl Iterator<Item = LitClass> {
+        let in_compute = |class: &DeferredClass| class.pipeline.variant.has(Feature::InCompute);
+        let any = self.deferred.iter().any(in_compute);
+        (1..).zip(&self.deferred).filter(move |_| any).map(move |(number, class)| {
+            let [x, y, ..] = class.window.pixels(size);
+            LitClass::new([x, y], number)
+        })
     }
 
     /// Returns every pipeline that is used, those of batches first, then those of deferred lighting.

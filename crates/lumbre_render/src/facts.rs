@@ -79,7 +79,9 @@ impl SceneFacts {
             path,
             refracts_by_pixel: rendering_path::refracts_by_pixel(options, objects, (samples, software)),
             refractive_shapes: shapes.map(|(shape, _)| shape).collect(),
-            g_buffer: path.is_deferred().then_some(GBufferContents { details }),
+            g_buffer: path
+                .is_deferred()
+                .then_some(GBufferContents { details, lit_in_compute: path.is_lit_in_compute() }),
             settings: *settings,
         }
     }

@@ -23,7 +23,7 @@ pub(crate) enum FrameBuffer {
     UniformLights,
     /// The same lights in a table, any number of them.
     InverseSquareLights,
-    /// Light counts of fragments.
+    /// Light counts of fragments, and of the pixels that compute shaders light.
     LightCounts,
     /// Light counts of vertices.
     VertexLightCounts,
@@ -72,13 +72,13 @@ impl FrameBuffer {
         matches!(self, Self::LightCounts | Self::VertexLightCounts)
     }
 
-    /// Returns the stages that it is bound for. Counts are bound for one stage only, because a device may
-    /// support writes in fragments but not in vertices.
+    /// Returns the stages that it is bound for. Counts of vertices are bound apart from those of fragments and of
+    /// compute shaders, because a device may support writes in fragments but not in vertices.
     fn visibility(self) -> wgpu::ShaderStages {
         match self {
-            Self::LightCounts => wgpu::ShaderStages::FRAGMENT,
+            Self::LightCounts => wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE,
             Self::VertexLightCounts => wgpu::ShaderStages::VERTEX,
-            _ => wgpu::ShaderStages::VERTEX_FRAGMENT,
+            _ => wgpu::ShaderStages::VERTEX_FRAGMENT | wgpu::ShaderStages::COMPUTE,
         }
     }
 

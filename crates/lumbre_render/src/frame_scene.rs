@@ -7,9 +7,10 @@ use lumbre_optics::FlatRule;
 
 use crate::draws::{Batch, Draws};
 use crate::extract::{CameraView, LitPass, Objects};
+use crate::g_buffer::{LitClass, WORKGROUP_SIDE};
 use crate::mesh_buffers::{Attribute, GpuMesh, MeshBuffers};
 use crate::mirror_views::MirrorView;
-use crate::pipelines::Pipelines;
+use crate::pipelines::{Pipeline, Pipelines};
 use crate::shader::{Feature, Variant};
 use crate::shadows::{BLOCK, ShadowMaps};
 use crate::view_buffers::{FrameGroup, ViewBuffers};
@@ -192,7 +193,12 @@ impl<'a> FrameScene<'a> {
         self.pipelines.g_buffer_layout()
     }
 
-    /// Lights the deferred surfaces of a pass.
+    /// Returns the layout of the G-buffer's bind group in compute shaders.
+    pub(crate) fn compute_layout(&self) -> &wgpu::BindGroupLayout {
+        self.pipelines.compute_layout()
+    }
+
+    /// Lights the deferred surfaces of a pass in fragments.
     pub(crate) fn light_deferred(
         &self,
         pass: &mut wgpu::RenderPass<'static>,
@@ -207,16 +213,49 @@ impl<'a> FrameScene<'a> {
             else {
                 continue;
             };
-            pass.set_pipeline(&pipeline.pipeline);
+            let Some(pipeline) = pipeline.render() else { continue };
+            pass.set_pipeline(pipeline);
             pass.set_bind_group(0, group, &[]);
             pass.set_bind_group(1, g_buffer, &[]);
-            if self.bind_light(pass, variant, class.baked_light.as_deref()) {
+            if self.bind_light(variant, class.baked_light.as_deref(), |index, group| {
+                pass.set_bind_group(index, group, &[]);
+            }) {
                 let [x, y, width, height] = class.window.pixels(self.size);
                 pass.set_scissor_rect(x, y, width, height);
                 pass.draw(0..3, number..number + 1);
             }
         }
         pass.set_scissor_rect(0, 0, self.size[0], self.size[1]);
+    }
+
+    /// Lights the deferred surfaces of all passes in compute shaders. `g_buffer` is group 1, of
+    /// [`lit_classes`](Self::lit_classes).
+    pub(crate) fn light_in_compute(&self, pass: &mut wgpu::ComputePass<'static>, g_buffer: &wgpu::BindGroup) {
+        let Some(buffers) = self.views.first() else { return };
+        for (class, offset) in self.draws.deferred.iter().zip((0..).step_by(size_of::<LitClass>())) {
+            let variant = &class.pipeline.variant;
+            let pipeline = self.pipelines.get(&class.pipeline).and_then(Pipeline::compute);
+            let (Some(pipeline), Some(group)) =
+                (pipeline, buffers.group(&FrameGroup::of(variant, class.pass)))
+            else {
+                continue;
+            };
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.set_bind_group(1, g_buffer, &[offset]);
+            if self.bind_light(variant, class.baked_light.as_deref(), |index, group| {
+                pass.set_bind_group(index, group, &[]);
+            }) {
+                let [_, _, width, height] = class.window.pixels(self.size);
+                let groups = |pixels: u32| pixels.div_ceil(WORKGROUP_SIDE);
+                pass.dispatch_workgroups(groups(width), groups(height), 1);
+            }
+        }
+    }
+
+    /// Returns the buffer of the classes of deferred surfaces.
+    pub(crate) fn lit_classes(&self) -> Option<&wgpu::Buffer> {
+        self.views.first()?.lit_classes.buffer()
     }
 
     /// Draws batches of a view. `group` returns the bind group 0 of a variant.
@@ -239,7 +278,8 @@ impl<'a> FrameScene<'a> {
             if slices.count == 0 {
                 continue;
             }
-            pass.set_pipeline(&pipeline.pipeline);
+            let Some(drawing) = pipeline.render() else { continue };
+            pass.set_pipeline(drawing);
             let wanted = group(variant);
             if bound != Some(wanted) {
                 let Some(group) = buffers.group(&wanted) else { continue };
@@ -249,7 +289,9 @@ impl<'a> FrameScene<'a> {
             if let Some(set) = &batch.texture_set {
                 pass.set_bind_group(1, &set.bind_group, &[]);
             }
-            if !self.bind_light(pass, variant, batch.baked_light.as_deref()) {
+            if !self.bind_light(variant, batch.baked_light.as_deref(), |index, group| {
+                pass.set_bind_group(index, group, &[]);
+            }) {
                 continue;
             }
             for (slot, buffer) in (0..).zip(&slices.attributes) {
@@ -265,20 +307,20 @@ impl<'a> FrameScene<'a> {
         }
     }
 
-    /// Binds baked light and shadow maps, as far as a variant reads them. Returns false if the shadow maps do
-    /// not exist.
+    /// Binds baked light and shadow maps with `set`, as far as a variant reads them. Returns false if the shadow
+    /// maps do not exist.
     fn bind_light(
         &self,
-        pass: &mut wgpu::RenderPass<'static>,
         variant: &Variant,
         baked_light: Option<&wgpu::BindGroup>,
+        mut set: impl FnMut(u32, Option<&wgpu::BindGroup>),
     ) -> bool {
         // When the previous pipeline has a group that this one lacks, wgpu-core 30 considers groups with a
         // higher index to be still bound and skips setting the same one again, although the device has
         // dropped it. Unsetting the group first makes wgpu bind it again.
         let mut bind_again = |index: u32, group: &wgpu::BindGroup| {
-            pass.set_bind_group(index, None::<&wgpu::BindGroup>, &[]);
-            pass.set_bind_group(index, group, &[]);
+            set(index, None);
+            set(index, Some(group));
         };
         if let Some(baked_light) = baked_light {
             bind_again(2, baked_light);

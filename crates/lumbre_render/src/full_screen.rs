@@ -1,5 +1,8 @@
 //! Pipelines that draw a triangle over the whole target, with the entry points `vertex` and `fragment` of a module.
-//! Not what they draw: display, planes of shadow maps and probes each have a shader of their own.
+//! Not what they draw: display, planes of shadow maps, pixels that compute shaders have lit, and probes each have a
+//! shader of their own.
+
+use crate::target::DEPTH_FORMAT;
 
 /// Creates a pipeline without vertex buffers, depth or blending, for a target of one sample. Without a `layout`, the
 /// shader's bindings give it.
@@ -9,6 +12,34 @@ pub(crate) fn pipeline(
     module: &wgpu::ShaderModule,
     layout: Option<&wgpu::PipelineLayout>,
     format: wgpu::TextureFormat,
+) -> wgpu::RenderPipeline {
+    make(device, label, module, layout, (format, None))
+}
+
+/// Like [`pipeline`], for a pass with a depth buffer, which it neither tests nor writes.
+pub(crate) fn pipeline_beside_depth(
+    device: &wgpu::Device,
+    label: &str,
+    module: &wgpu::ShaderModule,
+    layout: Option<&wgpu::PipelineLayout>,
+    format: wgpu::TextureFormat,
+) -> wgpu::RenderPipeline {
+    let depth = wgpu::DepthStencilState {
+        format: DEPTH_FORMAT,
+        depth_write_enabled: Some(false),
+        depth_compare: Some(wgpu::CompareFunction::Always),
+        stencil: Default::default(),
+        bias: Default::default(),
+    };
+    make(device, label, module, layout, (format, Some(depth)))
+}
+
+fn make(
+    device: &wgpu::Device,
+    label: &str,
+    module: &wgpu::ShaderModule,
+    layout: Option<&wgpu::PipelineLayout>,
+    (format, depth_stencil): (wgpu::TextureFormat, Option<wgpu::DepthStencilState>),
 ) -> wgpu::RenderPipeline {
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(label),
@@ -20,7 +51,7 @@ pub(crate) fn pipeline(
             buffers: &[],
         },
         primitive: Default::default(),
-        depth_stencil: None,
+        depth_stencil,
         multisample: Default::default(),
         fragment: Some(wgpu::FragmentState {
             module,

@@ -14,11 +14,17 @@ pub(crate) struct GBufferContents {
     /// Lightmap coordinates, and the tint by which textures and vertex colours modulate light. Only frames
     /// with any of these have details.
     pub details: bool,
+    /// Compute shaders light it, instead of fragments.
+    pub lit_in_compute: bool,
 }
 
 /// Format of each of its textures. Two of them use all 32 bytes per sample that every device can write at
 /// once.
 pub(crate) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
+/// Format of the pixels that compute shaders light. It holds the values of every target exactly.
+pub(crate) const LIT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+/// Pixels that a workgroup of the compute shader lights, in each direction.
+pub(crate) const WORKGROUP_SIDE: u32 = 8;
 /// The largest class number; 0 means none.
 pub(crate) const LAST_CLASS: u32 = 0xff;
 /// The largest instance index that it can store.
@@ -31,6 +37,22 @@ pub(crate) struct DeferredVariants {
     pub geometry: Variant,
     /// Lights the surface, together with all others that use the same variant.
     pub lighting: Variant,
+}
+
+/// What a dispatch of deferred lighting lights: the class with this number, from this pixel on. It is as long as
+/// dynamic offsets of uniforms are apart on every device.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct LitClass {
+    corner: [u32; 2],
+    number: u32,
+    padding: [u32; 61],
+}
+
+impl LitClass {
+    pub fn new(corner: [u32; 2], number: u32) -> Self {
+        Self { corner, number, padding: [0; 61] }
+    }
 }
 
 /// Features that write the details of the G-buffer, or that are needed to compute them.
@@ -72,43 +94,100 @@ impl DeferredVariants {
         let mut lighting = forward.without(&read);
         lighting.set(Feature::VertexColor, tinted);
         lighting.set(Feature::Deferred, true);
+        lighting.set(Feature::InCompute, contents.lit_in_compute);
         // Keeps variants that read details from standing in for this one in frames without them.
         lighting.set(Feature::GBufferDetails, contents.details);
         Some(Self { geometry, lighting })
     }
 }
 
-/// Creates the layout of group 1 of deferred lighting: the two textures. Without details, the first texture
-/// is bound twice.
+/// Binding of a texture of the G-buffer.
+pub(crate) const TEXTURE_BINDING: wgpu::BindingType = wgpu::BindingType::Texture {
+    sample_type: wgpu::TextureSampleType::Uint,
+    view_dimension: wgpu::TextureViewDimension::D2,
+    multisampled: false,
+};
+
+/// Creates the layout of group 1 of deferred lighting in fragments: the two textures. Without details, the
+/// first texture is bound twice.
 pub(crate) fn layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
-    let entry = |binding| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::FRAGMENT,
-        ty: wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Uint,
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        },
-        count: None,
-    };
+    let of = |binding| entry(wgpu::ShaderStages::FRAGMENT, binding, TEXTURE_BINDING);
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("g-buffer"),
-        entries: &[entry(0), entry(1)],
+        entries: &[of(0), of(1)],
     })
 }
 
-/// Creates group 1 of deferred lighting.
+/// Creates the layout of group 1 of deferred lighting in a compute shader: the two textures, the texture of lit
+/// pixels, and a [`LitClass`] at a dynamic offset.
+pub(crate) fn compute_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    let of = |binding, ty| entry(wgpu::ShaderStages::COMPUTE, binding, ty);
+    let lit = wgpu::BindingType::StorageTexture {
+        access: wgpu::StorageTextureAccess::WriteOnly,
+        format: LIT_FORMAT,
+        view_dimension: wgpu::TextureViewDimension::D2,
+    };
+    let class = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: true,
+        min_binding_size: wgpu::BufferSize::new(size_of::<LitClass>() as u64),
+    };
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("g-buffer in a compute shader"),
+        entries: &[of(0, TEXTURE_BINDING), of(1, TEXTURE_BINDING), of(2, lit), of(3, class)],
+    })
+}
+
+/// Returns an entry of a layout.
+pub(crate) fn entry(
+    visibility: wgpu::ShaderStages,
+    binding: u32,
+    ty: wgpu::BindingType,
+) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
+}
+
+/// Creates group 1 of deferred lighting in fragments.
 pub(crate) fn group(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     surfaces: &wgpu::TextureView,
     details: Option<&wgpu::TextureView>,
 ) -> wgpu::BindGroup {
-    let entry =
-        |binding, view| wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) };
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("g-buffer"),
         layout,
-        entries: &[entry(0, surfaces), entry(1, details.unwrap_or(surfaces))],
+        entries: &[texture(0, surfaces), texture(1, details.unwrap_or(surfaces))],
     })
+}
+
+/// Creates group 1 of deferred lighting in a compute shader. `classes` holds a [`LitClass`] at each dynamic
+/// offset.
+pub(crate) fn compute_group(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    surfaces: &wgpu::TextureView,
+    details: Option<&wgpu::TextureView>,
+    (lit, classes): (&wgpu::TextureView, &wgpu::Buffer),
+) -> wgpu::BindGroup {
+    let class = wgpu::BufferBinding {
+        buffer: classes,
+        offset: 0,
+        size: wgpu::BufferSize::new(size_of::<LitClass>() as u64),
+    };
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("g-buffer in a compute shader"),
+        layout,
+        entries: &[
+            texture(0, surfaces),
+            texture(1, details.unwrap_or(surfaces)),
+            texture(2, lit),
+            wgpu::BindGroupEntry { binding: 3, resource: wgpu::BindingResource::Buffer(class) },
+        ],
+    })
+}
+
+/// Returns an entry of a bind group.
+pub(crate) fn texture(binding: u32, view: &wgpu::TextureView) -> wgpu::BindGroupEntry<'_> {
+    wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) }
 }

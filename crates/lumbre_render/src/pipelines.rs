@@ -1,4 +1,4 @@
-//! Render pipelines for drawing and lighting surfaces, created when a draw first needs them, either at once
+//! Pipelines for drawing and lighting surfaces, created when a draw first needs them, either at once
 //! or on the device's worker thread. Which draw needs which pipeline is decided in `draws`.
 
 use std::cmp::Reverse;
@@ -37,10 +37,33 @@ pub(crate) struct PipelineKey {
 /// A pipeline and the attributes that it reads, in the order of its vertex buffers.
 #[derive(Debug)]
 pub(crate) struct Pipeline {
-    pub pipeline: wgpu::RenderPipeline,
+    pub pipeline: DevicePipeline,
     pub attributes: Vec<Attribute>,
     /// Whether it draws three vertices per triangle without indices.
     pub flat: bool,
+}
+
+/// What a pipeline is on the device: all of them draw but those that light the G-buffer in a compute shader.
+#[derive(Debug)]
+pub(crate) enum DevicePipeline {
+    Render(wgpu::RenderPipeline),
+    Compute(wgpu::ComputePipeline),
+}
+
+impl Pipeline {
+    pub fn render(&self) -> Option<&wgpu::RenderPipeline> {
+        match &self.pipeline {
+            DevicePipeline::Render(pipeline) => Some(pipeline),
+            DevicePipeline::Compute(_) => None,
+        }
+    }
+
+    pub fn compute(&self) -> Option<&wgpu::ComputePipeline> {
+        match &self.pipeline {
+            DevicePipeline::Render(_) => None,
+            DevicePipeline::Compute(pipeline) => Some(pipeline),
+        }
+    }
 }
 
 /// All pipelines made so far.
@@ -50,6 +73,7 @@ pub(crate) struct Pipelines {
     shadow_layout: wgpu::BindGroupLayout,
     volume_layout: wgpu::BindGroupLayout,
     g_buffer_layout: wgpu::BindGroupLayout,
+    compute_layout: wgpu::BindGroupLayout,
     tables: TableAccess,
     modules: Modules,
     pipelines: HashMap<PipelineKey, Pending<Pipeline>>,
@@ -68,6 +92,7 @@ impl Pipelines {
             shadow_layout: shadows::receiver_layout(gpu),
             volume_layout: irradiance_volumes::layout(gpu),
             g_buffer_layout: g_buffer::layout(gpu),
+            compute_layout: g_buffer::compute_layout(gpu),
             tables: TableAccess {
                 in_textures: gpu.reads_tables_from_textures(),
                 shared: can_share_records(gpu),
@@ -92,9 +117,14 @@ impl Pipelines {
         &self.volume_layout
     }
 
-    /// Returns the layout of group 1, for variants that light from the G-buffer.
+    /// Returns the layout of group 1, for variants that light from the G-buffer in fragments.
     pub fn g_buffer_layout(&self) -> &wgpu::BindGroupLayout {
         &self.g_buffer_layout
+    }
+
+    /// Returns the layout of group 1, for variants that light from the G-buffer in a compute shader.
+    pub fn compute_layout(&self) -> &wgpu::BindGroupLayout {
+        &self.compute_layout
     }
 
     /// Returns the number of shader variants compiled so far.
@@ -123,6 +153,7 @@ impl Pipelines {
     ) -> Result<bool, RenderError> {
         if !self.pipelines.contains_key(&key) {
             let textures = match key.variant.has(Feature::Deferred) {
+                true if key.variant.has(Feature::InCompute) => Some(self.compute_layout.clone()),
                 true => Some(self.g_buffer_layout.clone()),
                 false => sets.layout(gpu, key.texture_mask),
             };
@@ -211,6 +242,40 @@ fn make(
     let module = &module(device, modules, key.variant, tables)?;
     let groups = groups.each_ref().map(Option::as_ref);
     let used = groups.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
+    let label = key.variant.to_string();
+    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(key.variant.module()),
+        bind_group_layouts: &groups[..used],
+        immediate_size: 0,
+    });
+    let pipeline = match key.variant.has(Feature::InCompute) {
+        true => DevicePipeline::Compute(device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(&label),
+            layout: Some(&layout),
+            module,
+            entry_point: Some("light"),
+            compilation_options: Default::default(),
+            cache: None,
+        })),
+        false => DevicePipeline::Render(render_pipeline(device, module, &layout, &key, &label)),
+    };
+    match pollster::block_on(scope.pop()) {
+        None => {
+            let (attributes, flat) = (attributes(&key.variant), is_flat(&key.variant));
+            Ok(Pipeline { pipeline, attributes, flat })
+        }
+        Some(error) => Err(RenderError::Shader { variant: label, message: error.to_string() }),
+    }
+}
+
+fn render_pipeline(
+    device: &wgpu::Device,
+    module: &wgpu::ShaderModule,
+    layout: &wgpu::PipelineLayout,
+    key: &PipelineKey,
+    label: &str,
+) -> wgpu::RenderPipeline {
     let attributes = attributes(&key.variant);
     let formats: Vec<[wgpu::VertexAttribute; 1]> = attributes
         .iter()
@@ -229,7 +294,6 @@ fn make(
             })
         })
         .collect();
-    let label = key.variant.to_string();
     let fullscreen = key.variant.has(Feature::Deferred);
     let target = Some(wgpu::ColorTargetState {
         format: key.format,
@@ -237,15 +301,9 @@ fn make(
         write_mask: wgpu::ColorWrites::ALL,
     });
     let targets = vec![target; key.variant.targets()];
-    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(key.variant.module()),
-        bind_group_layouts: &groups[..used],
-        immediate_size: 0,
-    });
-    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(&label),
-        layout: Some(&layout),
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout: Some(layout),
         vertex: wgpu::VertexState {
             module,
             entry_point: Some("vertex"),
@@ -280,11 +338,7 @@ fn make(
         }),
         multiview_mask: None,
         cache: None,
-    });
-    match pollster::block_on(scope.pop()) {
-        None => Ok(Pipeline { pipeline, attributes, flat: is_flat(&key.variant) }),
-        Some(error) => Err(RenderError::Shader { variant: label, message: error.to_string() }),
-    }
+    })
 }
 
 /// Returns the shader module of a variant, compiling it if needed.

@@ -857,6 +857,11 @@ impl Renderer {
                 uploads.clusters += buffers.clusters.pending_bytes();
                 renewed.push(buffers.clusters.upload(&self.gpu));
             }
+            buffers.lit_classes.replace(draws.lit_classes(size));
+            if !buffers.lit_classes.values.is_empty() {
+                uploads.instances += buffers.lit_classes.pending_bytes();
+                renewed.push(buffers.lit_classes.upload(&self.gpu));
+            }
         }
         if renewed.iter().any(|renewed| !matches!(renewed, Ok(false))) {
             // Even if an upload failed, the old bind groups refer to buffers that no longer exist.

@@ -35,7 +35,7 @@ pub(crate) fn refracts_by_pixel(
 ) -> bool {
     let may = match options.rendering_path {
         RenderingPath::Forward => false,
-        RenderingPath::Deferred => true,
+        RenderingPath::Deferred | RenderingPath::DeferredCompute => true,
         RenderingPath::Auto => software,
     };
     let many = objects.refractive_triangles >= MANY_REFRACTIVE_TRIANGLES * objects.refractive;
@@ -86,7 +86,7 @@ impl ChosenPath {
         match options.rendering_path {
             RenderingPath::Forward => Self::Asked(RenderingPath::Forward),
             _ if samples > 1 => Self::SeveralSamples,
-            RenderingPath::Deferred => Self::Asked(RenderingPath::Deferred),
+            asked @ (RenderingPath::Deferred | RenderingPath::DeferredCompute) => Self::Asked(asked),
             RenderingPath::Auto if !lit_by_pixel => Self::NotDeferrable,
             RenderingPath::Auto if clustered < enough => Self::FewLights { lights: clustered, software },
             RenderingPath::Auto if pixels > most * triangles as u64 => {
@@ -98,7 +98,20 @@ impl ChosenPath {
     }
 
     pub fn is_deferred(self) -> bool {
-        matches!(self, Self::Asked(RenderingPath::Deferred) | Self::ManyLights { .. })
+        match self {
+            Self::Asked(path) => path != RenderingPath::Forward,
+            Self::ManyLights { .. } => true,
+            _ => false,
+        }
+    }
+
+    /// Returns true if compute shaders light the G-buffer: on every GPU. A processor gains nothing by them.
+    pub fn is_lit_in_compute(self) -> bool {
+        match self {
+            Self::Asked(path) => path == RenderingPath::DeferredCompute,
+            Self::ManyLights { software, .. } => !software,
+            _ => false,
+        }
     }
 }
 
@@ -133,7 +146,8 @@ impl Display for ChosenPath {
             ),
             Self::ManyLights { lights, triangles, software: false } => write!(
                 out,
-                "deferred: a GPU draws {triangles} triangles, whose fragments find {lights} lights by clusters"
+                "deferred: a GPU draws {triangles} triangles, and lights their pixels in compute shaders, which find \
+                 {lights} lights by clusters"
             ),
         }
     }

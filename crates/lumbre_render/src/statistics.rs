@@ -57,7 +57,7 @@ pub struct Uploads {
     pub transforms: u64,
     /// Records of materials.
     pub materials: u64,
-    /// Instances of the draws.
+    /// Instances of the draws, and the classes of surfaces that compute shaders light.
     pub instances: u64,
     /// Records of lights.
     pub lights: u64,

@@ -151,7 +151,8 @@ const SURFACE_MAPS_BINDING: u32 = 10;
 fn layout_of(gpu: &Gpu, first: &[u32], maps: bool) -> wgpu::BindGroupLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,
-        visibility: wgpu::ShaderStages::FRAGMENT,
+        // Compute shaders light by lightmaps, too.
+        visibility: wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE,
         ty,
         count: None,
     };

@@ -1,5 +1,5 @@
-//! The buffers that one view of a frame has for itself: its matrices, its clusters of lights, and the bind
-//! groups 0 that refer to them. What all views of a frame share (objects, materials, lights) belongs to the
+//! The buffers that one view of a frame has for itself: its matrices, its clusters of lights, the classes of
+//! surfaces that compute shaders light, and the bind groups 0 that refer to them. What all views of a frame share (objects, materials, lights) belongs to the
 //! renderer.
 
 use std::collections::{HashMap, HashSet};
@@ -12,6 +12,8 @@ use crate::cluster_buffers::ClusterBuffers;
 use crate::draws::Draws;
 use crate::extract::{CameraView, LightSet, LitPass};
 use crate::frame_bindings::{FrameBindings, FrameBuffer};
+use crate::g_buffer::LitClass;
+use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{FrameData, radiance};
 use crate::light_counter::LightCounter;
 use crate::shader::Variant;
@@ -52,6 +54,8 @@ impl FrameGroup {
 pub(crate) struct ViewBuffers {
     frame: wgpu::Buffer,
     pub clusters: ClusterBuffers,
+    /// The classes of deferred surfaces, if compute shaders light them.
+    pub lit_classes: GrowableBuffer<LitClass>,
     groups: HashMap<FrameGroup, wgpu::BindGroup>,
 }
 
@@ -63,7 +67,12 @@ impl ViewBuffers {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        Self { frame, clusters: ClusterBuffers::new(), groups: HashMap::new() }
+        Self {
+            frame,
+            clusters: ClusterBuffers::new(),
+            lit_classes: GrowableBuffer::uniform("lit classes", 1),
+            groups: HashMap::new(),
+        }
     }
 
     /// Uploads the matrices of a view and what its shaders need to know of the scene. `origin` is the origin

@@ -57,8 +57,9 @@ impl WarmUps {
         key: PipelineKey,
         (textures, lightmaps): (Option<&TextureSet>, LightmapEncoding),
     ) -> Option<Afterwards> {
-        // Variants that count lights are for measurements, where a long frame does not matter.
-        if key.variant.has(Feature::CountLights) {
+        // Variants that count lights are for measurements, where a long frame does not matter, and compute shaders
+        // are for GPUs.
+        if key.variant.has(Feature::CountLights) || key.variant.has(Feature::InCompute) {
             return None;
         }
         let textures = textures.map(|set| set.stand_ins.clone());
@@ -269,7 +270,8 @@ impl WarmUp {
             depth_stencil_attachment: Some(depth_attachment(&depth)),
             ..Default::default()
         });
-        pass.set_pipeline(&pipeline.pipeline);
+        let Some(drawing) = pipeline.render() else { return Ok(()) };
+        pass.set_pipeline(drawing);
         for (index, group) in (0..).zip(groups).filter(|(_, group)| group.is_some()) {
             pass.set_bind_group(index, group, &[]);
         }

@@ -4,7 +4,9 @@
 use std::any::{Any, TypeId};
 use std::collections::HashMap;
 
-use lumbre_graph::{BufferHandle, BufferRead, LoadOp, PassBuilder, Raster, TextureDescriptor, TextureHandle};
+use lumbre_graph::{
+    BufferHandle, BufferRead, LoadOp, PassBuilder, PassType, Raster, TextureDescriptor, TextureHandle,
+};
 
 use super::FrameGraph;
 use crate::frame_plan::{Ending, FramePlan};
@@ -109,11 +111,11 @@ impl Board {
         }
     }
 
-    /// Makes a pass that draws lit surfaces into another target depend on what they are lit with.
-    pub(super) fn lit<'g, 'a>(
+    /// Makes a pass that lights surfaces, but draws nothing into the frame, depend on what they are lit with.
+    pub(super) fn lit<'g, 'a, K: PassType>(
         &self,
-        pass: PassBuilder<'g, 'a, Raster, FrameScene<'a>>,
-    ) -> PassBuilder<'g, 'a, Raster, FrameScene<'a>> {
+        pass: PassBuilder<'g, 'a, K, FrameScene<'a>>,
+    ) -> PassBuilder<'g, 'a, K, FrameScene<'a>> {
         let pass = self.lit_by.iter().fold(pass, |pass, texture| pass.samples(texture));
         self.lit_by_buffers.iter().fold(pass, |pass, (buffer, how)| pass.reads(buffer, *how))
     }

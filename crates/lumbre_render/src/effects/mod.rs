@@ -13,6 +13,7 @@
 
 mod background;
 mod board;
+mod deferred_composite;
 mod display;
 mod forward;
 mod g_buffer;

@@ -150,6 +150,8 @@ features! {
     Deferred = 59 => "DEFERRED",
     /// Reflects baked light like a metal.
     BakedMetal = 61 => "BAKED_METAL",
+    /// Lights the surfaces in the G-buffer in a compute shader.
+    InCompute = 62 => "IN_COMPUTE",
 }
 
 /// The feature flag of shaders that read the tables of a frame: whether the tables are textures.
@@ -204,7 +206,8 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::CountLights as u64
     | Feature::GBuffer as u64
     | Feature::GBufferDetails as u64
-    | Feature::Deferred as u64;
+    | Feature::Deferred as u64
+    | Feature::InCompute as u64;
 
 /// Features that make the colour of a surface vary over it, or between its front and its back.
 const VARYING: u64 = Feature::Lights as u64
@@ -383,12 +386,13 @@ impl Variant {
     }
 
     /// Returns true if its fragments load records for each other on a device that can do that. Fragments that
-    /// count lights do not: each counts those of its own lists.
+    /// count lights do not: each counts those of its own lists. Nor do compute shaders, which are for GPUs.
     fn shares_records(&self) -> bool {
         self.shading == Shading::Phong
             && self.has(Feature::Lights)
             && !self.has(Feature::CountLights)
             && !self.has(Feature::GBuffer)
+            && !self.has(Feature::InCompute)
     }
 
     /// Returns the shader's feature flags on a device that reads tables this way: each name, and whether it
