@@ -1,13 +1,15 @@
 //! Measures the errors of baked levels in the region that a player sees: `level_errors [NAME|FILE.glb …] [--error X]
 //! [--time SECONDS] [--seed N] [--texels-per-meter N] [--points N] [--cache FOLDER] [--reference]
-//! [--anew|--paths|--converged] [--flip] [--pictures FOLDER] [--stages] [--no-denoise] [--no-seams] [--patch-texels N]`.
+//! [--anew|--paths|--converged] [--point-error X] [--flip] [--pictures FOLDER] [--stages] [--no-denoise] [--no-seams] [--patch-texels N]`.
 //!
 //! It bakes each level (all of them if none is named) and prints one row for it: errors at reference points away from
 //! shadow edges, relative to the light around a point. The reference points are read from the cache or from the tests'
 //! folder (not from the latter with `--anew`) and computed if there are none; `--points 0` does without. With `--paths`
 //! they are computed by paths that no cached light cuts short, unbiased and noisy. With `--converged` the points show
 //! what a converged bake of the same texels has there: then the errors are those that more rays would remove, without
-//! what the map's resolution leaves and without a reference's noise.
+//! what the map's resolution leaves and without a reference's noise. `--point-error` is the standard error of new points
+//! as a share of their light (0.004 if it is not given): where bakes are about as exact as that, it is a part of the
+//! errors that are printed.
 //!
 //! With `--flip` the level's view is compared with that of a converged bake of the same texels, which is also stored in
 //! the cache; with `--pictures` the views are written, the converged one only with `--flip`.
@@ -56,6 +58,7 @@ struct Request {
     pictures: Option<PathBuf>,
     stages: bool,
     reference: Reference,
+    effort: Effort,
 }
 
 /// What bakes are compared with.
@@ -80,6 +83,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         pictures: None,
         stages: false,
         reference: Reference::Stored,
+        effort: Effort::reference(),
     };
     let mut names = Vec::new();
     let mut arguments = std::env::args().skip(1);
@@ -90,6 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--error" => options.error = value()?.parse()?,
             "--time" => options.time = Some(Duration::try_from_secs_f64(value()?.parse()?)?),
             "--seed" => options.seed = value()?.parse()?,
+            "--point-error" => request.effort = Effort::reference_to(value()?.parse()?),
             "--anew" => request.reference = Reference::CachedLight,
             "--paths" => request.reference = Reference::Paths,
             "--converged" => request.reference = Reference::Converged,
@@ -238,11 +243,12 @@ fn points(name: &str, mut world: World, request: &Request) -> Result<Vec<Irradia
             converged_points(world, &points, &request.options)?
         }
         Reference::Paths => {
-            let effort = Effort { batches: [16, MAX_BATCHES], ..Effort::reference() };
+            let [_, most] = request.effort.batches;
+            let effort = Effort { batches: [16, most.max(MAX_BATCHES)], ..request.effort };
             tracer.points(request.points, effort, 7)
         }
         Reference::Stored | Reference::CachedLight => {
-            tracer.with_indirect_cache(7).points(request.points, Effort::reference(), 7)
+            tracer.with_indirect_cache(7).points(request.points, request.effort, 7)
         }
     };
     if let Some(folder) = &request.cache {

@@ -32,10 +32,13 @@ const VERTICAL_ADVANTAGE: f64 = 0.4;
 
 /// A horizontal view is raised if the scene would fill less than this fraction of the frame's height, and to this
 /// angle in radians.
-const LOW: f64 = 0.15;
+const LOW: f64 = 0.25;
 const RAISED: f64 = std::f64::consts::FRAC_PI_6;
 /// It is not raised unless rays from above reach at least this depth.
 const OPEN_ABOVE: f64 = 0.5;
+
+/// Thickness, as a fraction of the scene's radius, below which a scene counts as flat.
+const FLAT: f64 = 1e-4;
 
 /// The viewing directions in order of preference; the camera is on the opposite side of the scene.
 const DIRECTIONS: [DVec3; 6] = [DVec3::NEG_Z, DVec3::NEG_X, DVec3::X, DVec3::Z, DVec3::NEG_Y, DVec3::Y];
@@ -96,8 +99,9 @@ fn frame(bounds: &Bounds, direction: DVec3, aspect: f64) -> (Transform, Camera) 
 /// The mean depth of the first hits for each viewing direction, from 0 to 1, over the rays that hit something in either
 /// direction; those that pass backs which are not drawn count as 0.
 fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
-    // A flat scene has no depth, but its coordinates must not overflow.
-    let least = (1e-9 * bounds.radius()).max(1e-200);
+    // A flat scene has no depth, but its coordinates must not overflow. Rounded rotations leave a plane some thickness,
+    // along which it would be seen from its edge.
+    let least = (FLAT * bounds.radius()).max(1e-200);
     let size = (bounds.max - bounds.min).max(DVec3::splat(least));
     // Maps the bounding box to [0, 1]³, so that one grid serves all directions, and a flat one to its middle.
     let unit = DAffine3::from_translation(DVec3::splat(0.5))
@@ -173,6 +177,7 @@ fn splat(corners: [DVec3; 3], direction: DVec3, depths: &mut [f64; GRID * GRID])
 mod tests {
     use std::sync::Arc;
 
+    use glam::DQuat;
     use lumbre_mesh::TriangleMesh;
 
     use super::*;
@@ -238,6 +243,23 @@ mod tests {
                 let along = (transform.translation - facing * distance).dot(facing);
                 assert!(along > 1.0, "at {distance}, facing {facing}: {transform:?}");
             }
+        }
+    }
+
+    /// A floor whose file rotates it upright from the xy plane by a rounded quaternion is seen from above, as one is that
+    /// needs no rotation, not as a line.
+    #[test]
+    fn a_floor_that_is_turned_by_rounded_numbers_is_seen_from_above() {
+        let rounded = DQuat::from_xyzw(-0.7071068286895752, 0.0, 0.0, 0.7071067094802856).normalize();
+        for rotation in [DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2), rounded] {
+            let mut world = World::new();
+            spawn_rectangle(&mut world, DVec3::ZERO, 2.5 * DVec3::X, 2.5 * DVec3::Y);
+            let mut floors = world.query_filtered::<Entity, With<Mesh>>();
+            let floor = floors.single(&world).unwrap();
+            world.entity_mut(floor).insert(Transform { rotation, ..Transform::IDENTITY });
+            update_transforms(&mut world);
+            let (transform, _) = default_camera(&mut world, 1.5);
+            assert!(transform.translation.y > 1.0, "{rotation}: {transform:?}");
         }
     }
 

@@ -82,7 +82,14 @@ impl Effort {
 
     /// A standard error of 0.4 %, unless it is still larger after 58,000 paths.
     pub fn reference() -> Self {
-        Self { side: 24, error: 0.004, batches: [8, 100] }
+        Self::reference_to(0.004)
+    }
+
+    /// This standard error as a share of the irradiance, unless it is still larger after 58,000 paths, or after as
+    /// many more as the square of a share below 0.4 % calls for.
+    pub fn reference_to(error: f64) -> Self {
+        let share = (0.004 / error).max(1.0);
+        Self { side: 24, error, batches: [8, (100.0 * share * share).min(1e6) as usize] }
     }
 }
 
