@@ -91,7 +91,16 @@ fn counted(world: &mut World, options: &FrameOptions) -> [LightCount; 3] {
         let pass = accounting.passes.iter().find(|pass| pass.pass == name);
         pass.and_then(|pass| pass.lights).unwrap_or_default()
     };
-    let counts = ["lightmap", "forward", "transparent"].map(of);
+    // What compute shaders count stands by their own pass.
+    let [lightmap, mut forward, transparent, computed] =
+        ["lightmap", "forward", "transparent", "deferred lighting"].map(of);
+    let in_compute = options.rendering_path == RenderingPath::DeferredCompute;
+    assert_eq!(computed == LightCount::default(), !in_compute);
+    if in_compute {
+        assert_eq!(forward, LightCount::default(), "no other pass counts");
+        forward = computed;
+    }
+    let counts = [lightmap, forward, transparent];
     // The picture is that of a frame that does not count, and that frame contains no trace of counting.
     let plain = FrameOptions { measure: Measure::TimeAndInvocations, ..options.clone() };
     let uncounted = canvas.draw(world, &plain).0;

@@ -8,7 +8,9 @@ use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{AlphaMode, Fog, FogMode, Light, Material, Shading, SpotCone};
-use lumbre_render::{FrameOptions, FrameReport, MissingPipelines, Offscreen, OffscreenFormat, Renderer};
+use lumbre_render::{
+    FrameOptions, FrameReport, MissingPipelines, Offscreen, OffscreenFormat, Renderer, RenderingPath,
+};
 use lumbre_scene::{AmbientCube, Camera, IrradianceVolume, MaterialTextures, Mesh, SceneSettings, Transform};
 use lumbre_tests::panes::{image, sharp};
 
@@ -130,6 +132,12 @@ fn what_is_switched_on_for_the_first_time_is_shown_when_its_pipelines_are_there(
     scene.change("glass", true, |scene| {
         scene.world.get_mut::<Material>(scene.ball).unwrap().transmission = Vec3::splat(0.4);
     });
+    scene.change("deferred shading in compute shaders, without fog", true, |scene| {
+        scene.options.rendering_path = RenderingPath::DeferredCompute;
+        scene.world.resource_mut::<SceneSettings>().fog = None;
+    });
+    let (_, report) = scene.frame();
+    assert!(report.plan.status("deferred lighting").unwrap().runs());
     scene.change("flat shading", true, |scene| scene.options.shading = Some(Shading::Flat));
     // Multisampling uses another format and a separate display pass.
     scene.change("multisampling", true, |scene| scene.options.multisample = Some(true));

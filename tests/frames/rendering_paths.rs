@@ -385,6 +385,12 @@ fn automatic_is_deferred_under_many_lights() {
     let without_a_device = path(lumbre_render::explain(&mut world, &auto, 40, 30).unwrap());
     let expected = if gpu().is_software() { "and a GPU gains from 1024 on" } else { "deferred: a GPU draws" };
     assert!(without_a_device.contains(expected), "{without_a_device}");
+    let more: Vec<Entity> =
+        (0..1020).map(|_| world.spawn((Light::point(Vec3::ONE).with_range(4.0), far)).id()).collect();
+    let of_a_gpu = lumbre_render::explain(&mut world, &auto, 40, 30).unwrap();
+    let lit = of_a_gpu.frame.passes.iter().find(|pass| pass.name == "deferred lighting");
+    assert!(lit.is_some_and(|pass| pass.group.is_some()), "a GPU lights in compute shaders");
+    more.into_iter().for_each(|lamp| assert!(world.despawn(lamp)));
     // With fewer lights a G-buffer is not worthwhile.
     lamps.into_iter().for_each(|lamp| assert!(world.despawn(lamp)));
     assert!(!runs(&mut world, &auto));
@@ -413,6 +419,8 @@ fn a_part_of_a_target_and_what_mirrors_show_are_the_same() {
         for path in [RenderingPath::Deferred, RenderingPath::DeferredCompute] {
             let (got, report) = drawn(path, viewport);
             assert!(report.plan.status("g-buffer").unwrap().runs());
+            let in_compute = path == RenderingPath::DeferredCompute;
+            assert_eq!(report.plan.status("deferred lighting").is_some_and(|pass| pass.runs()), in_compute);
             assert_eq!(report.statistics.mirror_views, 1);
             let apart = expected.iter().zip(&got).map(|(a, b)| a.abs_diff(*b)).max();
             println!("{viewport:?}, {path:?}: {apart:?} of 255");
@@ -458,6 +466,8 @@ fn compute_shaders_write_what_each_target_takes() {
                 let report = Renderer::new(gpu()).render(&mut world, &frame.target(), &options).unwrap();
                 // The probe needs the linear frame, which the display pass then converts.
                 assert_eq!(report.plan.status("display").unwrap().runs(), probe);
+                let in_compute = rendering_path == RenderingPath::DeferredCompute;
+                assert_eq!(report.plan.status("deferred lighting").is_some(), in_compute);
                 frame.read_rgba8(gpu()).unwrap()
             };
             let fragments = drawn(RenderingPath::Deferred);
@@ -467,4 +477,25 @@ fn compute_shaders_write_what_each_target_takes() {
             assert!(apart <= Some(1), "{display:?}, {probe}: {apart:?}");
         }
     }
+}
+
+/// Where a program's own effect hides every surface, nothing of an earlier frame is left that compute shaders lit there.
+#[test]
+fn what_compute_shaders_lit_in_an_earlier_frame_is_gone() {
+    let mut world = room(Projection::orthographic(14.0, 9.0, 23.0));
+    let eye = DVec3::new(1.0, 6.0, 11.0);
+    let near = Transform::from_translation(eye.lerp(DVec3::new(0.0, 0.5, 0.0), 0.3));
+    let passing = world.spawn((Mesh::from(ball()), shiny(0.9, 0.2, 0.1), near)).id();
+    let mut renderer = Renderer::builder().with(Curtain).build(gpu());
+    let frame = Offscreen::new(gpu(), SIZE.0, SIZE.1, OffscreenFormat::LinearFloat).unwrap();
+    let mut drawn = |world: &mut World, renderer: &mut Renderer| {
+        renderer.render(world, &frame.target(), &by(RenderingPath::DeferredCompute)).unwrap();
+        frame.read_linear(gpu()).unwrap()
+    };
+    let before = drawn(&mut world, &mut renderer);
+    world.despawn(passing);
+    let after = drawn(&mut world, &mut renderer);
+    let fresh = drawn(&mut world, &mut Renderer::builder().with(Curtain).build(gpu()));
+    assert!(after == fresh, "something of the ball is left");
+    assert!(before != after, "the ball was seen");
 }

@@ -566,8 +566,8 @@ pub struct Frame {
     /// Filter highlights within pixels under Phong shading, or not, instead of as the file says.
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     pub specular_antialiasing: Option<bool>,
-    /// Light opaque surfaces as they are drawn (forward) or afterwards from a G-buffer, in fragments (deferred) or in
-    /// compute shaders (deferred-compute). auto (the default) chooses deferred where many lights meet small triangles,
+    /// Light opaque surfaces as they are drawn (forward) or afterwards from a G-buffer, in fragment shaders
+    /// (deferred) or in compute shaders (deferred-compute). auto (the default) chooses deferred where many lights meet small triangles,
     /// and deferred-compute there on a GPU. The picture is the same but for a few pixels of glass.
     #[arg(long, value_name = "auto|forward|deferred|deferred-compute", value_parser = rendering_path)]
     pub rendering_path: Option<RenderingPath>,

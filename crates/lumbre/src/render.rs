@@ -50,6 +50,7 @@ struct PassTimes {
     gpu_ms: Option<f64>,
     vertex_invocations: Option<u64>,
     fragment_invocations: Option<u64>,
+    compute_invocations: Option<u64>,
     /// Lights tested against each object of this pass.
     lights_tested: u32,
     /// Average number of lights in the list of a visible object, which its vertices or fragments evaluate.
@@ -146,6 +147,7 @@ impl FrameTimes {
             let invocations = same.and_then(|same| same.invocations);
             pass.vertex_invocations = invocations.map(|counts| counts.vertex);
             pass.fragment_invocations = invocations.map(|counts| counts.fragment);
+            pass.compute_invocations = invocations.map(|counts| counts.compute);
         }
         if let Some(accounting) = &mut self.accounting {
             accounting.take_invocations_of(counted);
@@ -182,6 +184,7 @@ fn frame_times(
             gpu_ms: pass.gpu.ms(),
             vertex_invocations: pass.invocations.map(|counts| counts.vertex),
             fragment_invocations: pass.invocations.map(|counts| counts.fragment),
+            compute_invocations: pass.invocations.map(|counts| counts.compute),
             lights_tested: lights.lights,
             lights_shaded: lights.lights_per_object,
             light_evaluations: None,

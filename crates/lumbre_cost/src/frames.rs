@@ -29,7 +29,7 @@ pub struct DrawnFrame {
     pub times: Vec<f64>,
     /// Its picture, in 32-bit floats and without exposure; empty if it is not drawn for its picture.
     pub picture: Picture,
-    /// Numbers of vertex and fragment invocations. How often a device shades a vertex that several triangles
+    /// Numbers of vertex and fragment invocations; pixels that compute shaders light count as fragments. How often a device shades a vertex that several triangles
     /// share, and whether it counts hidden fragments, depends on the device: `None` if only counts that are
     /// the same on all machines are wanted.
     pub invocations: Option<[u64; 2]>,
@@ -288,8 +288,9 @@ fn picture_of(
     let report = renderer.render(world, &target.target(), &options)?;
     let measured = renderer.wait()?.cloned().unwrap_or_default();
     let invocations = measured.passes.iter().filter_map(|pass| pass.invocations);
-    let sum = invocations
-        .fold([0, 0], |[vertices, fragments], found| [vertices + found.vertex, fragments + found.fragment]);
+    let sum = invocations.fold([0, 0], |[vertices, fragments], found| {
+        [vertices + found.vertex, fragments + found.fragment + found.compute]
+    });
     let radiance = target.read_linear(conditions.gpu)?;
     Ok(DrawnFrame {
         times: Vec::new(),

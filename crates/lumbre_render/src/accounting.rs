@@ -85,12 +85,13 @@ pub struct PassAccount {
     pub shared: bool,
     /// Shader invocations.
     pub invocations: Option<Invocations>,
-    /// Lights that its vertices or fragments tested, if they were counted.
+    /// Lights that its vertices, fragments or pixels (in compute shaders) tested, if they were counted.
     pub lights: Option<LightCount>,
 }
 
 /// How many lights a pass tests, and how many of these contribute. They are counted while the pass draws, by
-/// vertices under flat and Gouraud shading and by fragments under Phong shading. Fragments that a later draw
+/// vertices under flat and Gouraud shading and by fragments under Phong shading, or by the pass that lights the
+/// G-buffer in compute shaders, which counts visible pixels. Fragments that a later draw
 /// covers are included. Fragments that are already hidden are not, because they are not shaded; masked
 /// surfaces are the exception, because their fragments run before the depth test.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -278,8 +279,13 @@ impl Accounting {
     fn write_passes(&self, text: &mut String) {
         let _ = writeln!(
             text,
-            "pass by pass on the device{:>42} {:>11} {:>11} {:>13} {:>13}",
-            "ms", "vertices", "fragments", "lights tested", "contributing"
+            "pass by pass on the device{:>42} {:>11} {:>11}{} {:>13} {:>13}",
+            "ms",
+            "vertices",
+            "fragments",
+            self.compute_column("compute"),
+            "lights tested",
+            "contributing"
         );
         let mut group = None;
         for pass in &self.passes {
@@ -296,13 +302,20 @@ impl Accounting {
             };
             let _ = writeln!(
                 text,
-                "  {name:<56} {ms:>9} {:>11} {:>11} {:>13} {:>13}",
+                "  {name:<56} {ms:>9} {:>11} {:>11}{} {:>13} {:>13}",
                 count(pass.invocations.map(|counts| counts.vertex)),
                 count(pass.invocations.map(|counts| counts.fragment)),
+                self.compute_column(&count(pass.invocations.map(|counts| counts.compute))),
                 count(pass.lights.map(|lights| lights.tested)),
                 count(pass.lights.map(|lights| lights.contributing)),
             );
         }
+    }
+
+    /// Returns a cell of the column for invocations of compute shaders, which only frames that have any show.
+    fn compute_column(&self, cell: &str) -> String {
+        let computes = |pass: &PassAccount| pass.invocations.is_some_and(|counts| counts.compute > 0);
+        if self.passes.iter().any(computes) { format!(" {cell:>11}") } else { String::new() }
     }
 
     fn write_sum(&self, text: &mut String) {
@@ -340,18 +353,25 @@ impl Accounting {
     fn write_effects(&self, text: &mut String) {
         let _ = writeln!(
             text,
-            "by effect{:>50} {:>9} {:>11} {:>11} {:>13} {:>13}",
-            "CPU ms", "GPU ms", "vertices", "fragments", "bytes", "pipelines"
+            "by effect{:>50} {:>9} {:>11} {:>11}{} {:>13} {:>13}",
+            "CPU ms",
+            "GPU ms",
+            "vertices",
+            "fragments",
+            self.compute_column("compute"),
+            "bytes",
+            "pipelines"
         );
         for effect in &self.effects {
             let _ = writeln!(
                 text,
-                "  {:<46} {:>9.3} {:>9} {:>11} {:>11} {:>13} {:>13}",
+                "  {:<46} {:>9.3} {:>9} {:>11} {:>11}{} {:>13} {:>13}",
                 effect.effect,
                 effect.cpu_ms,
                 milliseconds(effect.gpu_ms),
                 count(effect.invocations.map(|counts| counts.vertex)),
                 count(effect.invocations.map(|counts| counts.fragment)),
+                self.compute_column(&count(effect.invocations.map(|counts| counts.compute))),
                 effect.uploaded_bytes,
                 effect.pipelines_made,
             );

@@ -9,7 +9,7 @@ use lumbre_scene::{ObjectTraits, SceneSettings};
 
 use crate::extract::{CameraView, LitPass, Object, Objects, Window};
 use crate::features::{self, FrameFeatures};
-use crate::g_buffer::{self, DeferredVariants, GBufferContents, LitClass};
+use crate::g_buffer::{self, DeferredVariants, GBufferContents, LitDispatch};
 use crate::irradiance_volumes::IrradianceVolumes;
 use crate::layout::InstanceData;
 use crate::light_lists::ObjectLightLists;
@@ -262,9 +262,11 @@ impl ChosenPipelines {
         match DeferredVariants::of(&forward.variant, pass, g_buffer) {
             Some(DeferredVariants { geometry, lighting }) => {
                 let drawn = PipelineKey { variant: geometry, format: g_buffer::FORMAT, ..forward };
-                // Lighting draws a full-screen triangle.
+                // Lighting draws a full-screen triangle, or dispatches a compute shader.
+                let in_compute = lighting.has(Feature::InCompute);
                 let lit = PipelineKey {
                     variant: lighting,
+                    format: if in_compute { g_buffer::LIT_FORMAT } else { forward.format },
                     mirrored: false,
                     double_sided: true,
                     texture_mask: 0,
@@ -377,14 +379,12 @@ impl Draws {
         (1..).zip(&self.deferred).filter(move |(_, class)| class.pass == pass)
     }
 
-    /// Returns what compute shaders light, in the order of the numbers, in a frame of this size.
-    pub fn lit_classes(&self, size: [u32; 2]) -> impl Iterator<Item = LitClass> {
-        let in_compute = |class: &DeferredClass| class.pipeline.variant.has(Feature::InCompute);
-        let any = self.deferred.iter().any(in_compute);
-        (1..).zip(&self.deferred).filter(move |_| any).map(move |(number, class)| {
-            let [x, y, ..] = class.window.pixels(size);
-            LitClass::new([x, y], number)
-        })
+    /// Returns the classes that compute shaders light in a frame of this size, in the order of their numbers: all
+    /// of them, or none.
+    pub fn dispatches(&self, size: [u32; 2]) -> impl Iterator<Item = (&DeferredClass, LitDispatch)> {
+        let in_compute = self.deferred.iter().any(|class| class.pipeline.variant.has(Feature::InCompute));
+        let lit: &[DeferredClass] = if in_compute { &self.deferred } else { &[] };
+        (1..).zip(lit).map(move |(number, class)| (class, LitDispatch::new(number, &class.window, size)))
     }
 
     /// Returns every pipeline that is used, those of batches first, then those of deferred lighting.

@@ -173,12 +173,14 @@ mod tests {
     use lumbre_optics::{ReflectionModel, Shading};
 
     use super::*;
+    use crate::extract::LitPass;
+    use crate::g_buffer::{DeferredVariants, GBufferContents};
     use crate::shader::TableAccess;
     use lumbre_shaders::to_wgsl;
 
     #[test]
     fn a_variant_is_bound_what_it_reads_and_nothing_else() {
-        let mut seen = BTreeSet::new();
+        let (mut seen, mut in_compute) = (BTreeSet::new(), false);
         let some: [&[Feature]; 8] = [
             &[],
             &[Feature::DynamicLights, Feature::PointLights],
@@ -201,23 +203,30 @@ mod tests {
                     let mut variant = Variant::new(*shading, ReflectionModel::Blinn);
                     features.iter().for_each(|feature| variant.set(*feature, true));
                     let variant = variant.reduced();
-                    let source = to_wgsl("forward", &variant.flags(TableAccess::default())).unwrap();
-                    let module = naga::front::wgsl::parse_str(&source).unwrap();
-                    let read: Vec<u32> = module
-                        .global_variables
-                        .iter()
-                        .filter_map(|(_, global)| {
-                            global.binding.as_ref().filter(|binding| binding.group == 0)
-                        })
-                        .map(|binding| binding.binding)
-                        .collect();
-                    let read = BTreeSet::from_iter(read);
-                    let bound = FrameBindings::of(&variant).buffers().map(FrameBuffer::binding).collect();
-                    assert_eq!(read, bound, "{variant}");
-                    seen.insert(read);
+                    let contents = GBufferContents { details: false, lit_in_compute: true };
+                    let deferred = DeferredVariants::of(&variant, LitPass::Forward, Some(contents));
+                    for variant in [Some(variant), deferred.map(|of| of.lighting)].into_iter().flatten() {
+                        let read = read_in_group_0(&variant);
+                        let bound = FrameBindings::of(&variant).buffers().map(FrameBuffer::binding);
+                        // Deferred lighting reads the places of surfaces from the G-buffer.
+                        let bound = bound.filter(|binding| {
+                            *binding != FrameBuffer::Objects.binding() || read.contains(binding)
+                        });
+                        assert_eq!(read, bound.collect(), "{variant}");
+                        in_compute |= variant.has(Feature::InCompute);
+                        seen.insert(read);
+                    }
                 }
             }
         }
-        assert!(seen.len() >= 12, "{seen:?}");
+        assert!(seen.len() >= 12 && in_compute, "{seen:?}");
+    }
+
+    /// Returns the bindings of group 0 that the shader of a variant declares.
+    fn read_in_group_0(variant: &Variant) -> BTreeSet<u32> {
+        let source = to_wgsl(variant.module(), &variant.flags(TableAccess::default())).unwrap();
+        let module = naga::front::wgsl::parse_str(&source).unwrap();
+        let bindings = module.global_variables.iter().filter_map(|(_, global)| global.binding.as_ref());
+        bindings.filter(|binding| binding.group == 0).map(|binding| binding.binding).collect()
     }
 }

@@ -10,7 +10,7 @@ use lumbre_graph::Plan;
 use lumbre_optics::FlatRule;
 use lumbre_scene::{Census, SceneSettings};
 
-use crate::draws::{Batch, Draws};
+use crate::draws::{Batch, DeferredClass, Draws};
 use crate::extract::{CameraView, LightSet, LitPass, SceneLights};
 use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
@@ -176,27 +176,35 @@ impl Decided {
 
     /// Returns what each of its lit passes draws and tests.
     pub fn lit_passes(&self) -> LitPasses {
+        // Compute shaders light the classes of all passes in one of their own.
+        let in_compute = |class: &DeferredClass| class.pipeline.variant.has(Feature::InCompute);
+        let (computed, drawn): (Vec<_>, Vec<_>) =
+            (1..).zip(&self.draws.deferred).partition(|(_, class)| in_compute(class));
+        let of = |pass: LitPass| {
+            let classes = drawn.iter().filter(|(_, class)| class.pass == pass).copied().collect();
+            self.pass_lights(self.draws.of(pass), classes)
+        };
         LitPasses {
-            lightmap: self.pass_lights(LitPass::Lightmap),
-            forward: self.pass_lights(LitPass::Forward),
-            refraction: self.pass_lights(LitPass::Refraction),
-            transparent: self.pass_lights(LitPass::Transparent),
+            deferred_lighting: self.pass_lights(&[], computed),
+            lightmap: of(LitPass::Lightmap),
+            forward: of(LitPass::Forward),
+            refraction: of(LitPass::Refraction),
+            transparent: of(LitPass::Transparent),
         }
     }
 
-    fn pass_lights(&self, pass: LitPass) -> PassLights {
+    /// Returns what a pass lights: batches that it draws, and deferred classes with their numbers.
+    fn pass_lights(&self, batches: &[Batch], classes: Vec<(u32, &DeferredClass)>) -> PassLights {
         let (mut objects, mut entries) = (0, 0);
         let (mut lists, mut lights) = (HashSet::new(), HashSet::<u32>::new());
         let (mut inverse_square, mut shadowed, mut ranged) = (false, false, false);
-        let (batches, classes) = (self.draws.of(pass), || self.draws.deferred_of(pass));
         let drawn = batches.iter().map(|batch| &batch.pipeline.variant);
-        for variant in drawn.chain(classes().map(|(_, class)| &class.pipeline.variant)) {
+        for variant in drawn.chain(classes.iter().map(|(_, class)| &class.pipeline.variant)) {
             inverse_square |= variant.has(Feature::InverseSquareClusters);
             shadowed |= variant.has(Feature::ShadowedClusters);
             ranged |= variant.has(Feature::RangedClusters);
         }
-        let numbers: Vec<u32> = classes().map(|(number, _)| number).collect();
-        let of_pass = |batch: &&Batch| numbers.contains(&batch.class_number);
+        let of_pass = |batch: &&Batch| classes.iter().any(|(number, _)| *number == batch.class_number);
         for batch in batches.iter().chain(self.draws.geometry.iter().filter(of_pass)) {
             for instance in
                 &self.draws.instances[batch.instances.start as usize..batch.instances.end as usize]
@@ -218,7 +226,7 @@ impl Decided {
         let clustered: u32 = of_clusters.iter().filter(|(read, _)| *read).map(|(_, count)| count).sum();
         PassLights {
             objects,
-            draws: batches.len() + classes().count(),
+            draws: batches.len() + classes.len(),
             // There are fewer than 2^32 lights. A light may be in the lists of objects and in those of
             // clusters, hence the minimum.
             lights: (lights.len() as u32 + clustered).min(set.every.all),

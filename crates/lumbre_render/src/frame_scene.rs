@@ -7,7 +7,7 @@ use lumbre_optics::FlatRule;
 
 use crate::draws::{Batch, Draws};
 use crate::extract::{CameraView, LitPass, Objects};
-use crate::g_buffer::{LitClass, WORKGROUP_SIDE};
+use crate::g_buffer::LitClass;
 use crate::mesh_buffers::{Attribute, GpuMesh, MeshBuffers};
 use crate::mirror_views::MirrorView;
 use crate::pipelines::{Pipeline, Pipelines};
@@ -194,8 +194,13 @@ impl<'a> FrameScene<'a> {
     }
 
     /// Returns the layout of the G-buffer's bind group in compute shaders.
-    pub(crate) fn compute_layout(&self) -> &wgpu::BindGroupLayout {
-        self.pipelines.compute_layout()
+    pub(crate) fn g_buffer_compute_layout(&self) -> &wgpu::BindGroupLayout {
+        self.pipelines.g_buffer_compute_layout()
+    }
+
+    /// Returns true if the lines of sight are parallel.
+    pub(crate) fn is_parallel(&self) -> bool {
+        self.view.viewer().w == 0.0
     }
 
     /// Lights the deferred surfaces of a pass in fragments.
@@ -229,10 +234,11 @@ impl<'a> FrameScene<'a> {
     }
 
     /// Lights the deferred surfaces of all passes in compute shaders. `g_buffer` is group 1, of
-    /// [`lit_classes`](Self::lit_classes).
+    /// [`lit_classes`](Self::lit_classes), one for each dispatch.
     pub(crate) fn light_in_compute(&self, pass: &mut wgpu::ComputePass<'static>, g_buffer: &wgpu::BindGroup) {
         let Some(buffers) = self.views.first() else { return };
-        for (class, offset) in self.draws.deferred.iter().zip((0..).step_by(size_of::<LitClass>())) {
+        let offsets = (0..).step_by(size_of::<LitClass>());
+        for ((class, dispatch), offset) in self.draws.dispatches(self.size).zip(offsets) {
             let variant = &class.pipeline.variant;
             let pipeline = self.pipelines.get(&class.pipeline).and_then(Pipeline::compute);
             let (Some(pipeline), Some(group)) =
@@ -246,9 +252,8 @@ impl<'a> FrameScene<'a> {
             if self.bind_light(variant, class.baked_light.as_deref(), |index, group| {
                 pass.set_bind_group(index, group, &[]);
             }) {
-                let [_, _, width, height] = class.window.pixels(self.size);
-                let groups = |pixels: u32| pixels.div_ceil(WORKGROUP_SIDE);
-                pass.dispatch_workgroups(groups(width), groups(height), 1);
+                let [columns, rows] = dispatch.workgroups;
+                pass.dispatch_workgroups(columns, rows, 1);
             }
         }
     }

@@ -16,8 +16,9 @@ pub(crate) fn pipeline(
     make(device, label, module, layout, (format, None))
 }
 
-/// Like [`pipeline`], for a pass with a depth buffer, which it neither tests nor writes.
-pub(crate) fn pipeline_beside_depth(
+/// Like [`pipeline`], for a pass with a depth buffer, which it does not write. Depth is reversed: with a triangle behind
+/// all surfaces, only pixels with a surface run the fragment shader.
+pub(crate) fn pipeline_behind_surfaces(
     device: &wgpu::Device,
     label: &str,
     module: &wgpu::ShaderModule,
@@ -27,7 +28,7 @@ pub(crate) fn pipeline_beside_depth(
     let depth = wgpu::DepthStencilState {
         format: DEPTH_FORMAT,
         depth_write_enabled: Some(false),
-        depth_compare: Some(wgpu::CompareFunction::Always),
+        depth_compare: Some(wgpu::CompareFunction::LessEqual),
         stencil: Default::default(),
         bias: Default::default(),
     };

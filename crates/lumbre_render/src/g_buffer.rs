@@ -5,7 +5,7 @@
 use lumbre_optics::Shading;
 
 use crate::Gpu;
-use crate::extract::LitPass;
+use crate::extract::{LitPass, Window};
 use crate::shader::{Feature, Variant};
 
 /// What the G-buffer of a frame holds.
@@ -23,8 +23,8 @@ pub(crate) struct GBufferContents {
 pub(crate) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 /// Format of the pixels that compute shaders light. It holds the values of every target exactly.
 pub(crate) const LIT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
-/// Pixels that a workgroup of the compute shader lights, in each direction.
-pub(crate) const WORKGROUP_SIDE: u32 = 8;
+/// Pixels that a workgroup of the compute shader lights along each axis, as in shaders/deferred_lighting.wesl.
+const WORKGROUP_SIDE: u32 = 8;
 /// The largest class number; 0 means none.
 pub(crate) const LAST_CLASS: u32 = 0xff;
 /// The largest instance index that it can store.
@@ -39,19 +39,35 @@ pub(crate) struct DeferredVariants {
     pub lighting: Variant,
 }
 
+/// The pass that lights the G-buffer in compute shaders.
+pub(crate) const COMPUTE_PASS: &str = "deferred lighting";
+
 /// What a dispatch of deferred lighting lights: the class with this number, from this pixel on. It is as long as
-/// dynamic offsets of uniforms are apart on every device.
+/// dynamic offsets of uniforms are apart on every device. Twin: `LitClass` in shaders/deferred_lighting.wesl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct LitClass {
     corner: [u32; 2],
     number: u32,
-    padding: [u32; 61],
+    clears: u32,
+    padding: [u32; 60],
 }
 
-impl LitClass {
-    pub fn new(corner: [u32; 2], number: u32) -> Self {
-        Self { corner, number, padding: [0; 61] }
+/// A dispatch of deferred lighting: what it lights, and its workgroups along both axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LitDispatch {
+    pub class: LitClass,
+    pub workgroups: [u32; 2],
+}
+
+impl LitDispatch {
+    /// Creates the dispatch for a class: its number, and the pixels that its surfaces may cover in a frame of
+    /// this size. The first dispatch covers the whole frame and clears what it does not light.
+    pub fn new(number: u32, window: &Window, size: [u32; 2]) -> Self {
+        let first = number == 1;
+        let [x, y, width, height] = if first { [0, 0, size[0], size[1]] } else { window.pixels(size) };
+        let class = LitClass { corner: [x, y], number, clears: u32::from(first), padding: [0; 60] };
+        Self { class, workgroups: [width, height].map(|pixels| pixels.div_ceil(WORKGROUP_SIDE)) }
     }
 }
 

@@ -31,7 +31,7 @@ pub struct Gpu {
 type LeastLimit = (&'static str, fn(&wgpu::Limits) -> u64, u64);
 
 /// The limits of a device that bound what a frame binds, with the least values that are required.
-const MIN_LIMITS: [LeastLimit; 4] = [
+const MIN_LIMITS: [LeastLimit; 6] = [
     ("max_bind_groups", |limits| u64::from(limits.max_bind_groups), 4),
     (
         "max_storage_buffers_per_shader_stage",
@@ -46,6 +46,17 @@ const MIN_LIMITS: [LeastLimit; 4] = [
         16,
     ),
     ("max_uniform_buffer_binding_size", |limits| limits.max_uniform_buffer_binding_size, 1 << 16),
+    // What compute shaders light the G-buffer with.
+    (
+        "max_storage_textures_per_shader_stage",
+        |limits| u64::from(limits.max_storage_textures_per_shader_stage),
+        1,
+    ),
+    (
+        "max_compute_invocations_per_workgroup",
+        |limits| u64::from(limits.max_compute_invocations_per_workgroup),
+        64,
+    ),
 ];
 
 impl Gpu {

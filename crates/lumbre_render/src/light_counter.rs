@@ -6,6 +6,7 @@ use lumbre_graph::{MapRequest, MapState};
 use crate::Gpu;
 use crate::accounting::LightCount;
 use crate::extract::LitPass;
+use crate::g_buffer;
 
 /// Bytes between the counts of two passes. They are bound at an offset, and 256 is a valid offset alignment
 /// on every device.
@@ -22,13 +23,45 @@ const OTHER_STORAGE_BUFFERS: u32 = 8;
 pub(crate) struct CountedStages {
     /// For flat and Gouraud shading.
     pub vertices: bool,
-    /// For Phong shading.
+    /// For Phong shading, also in compute shaders.
     pub fragments: bool,
 }
 
+/// A pass that counts: one that draws lit surfaces, or the one that lights the G-buffer in compute shaders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum CountedPass {
+    Drawn(LitPass),
+    DeferredLighting,
+}
+
+/// Number of passes that count.
+const PASSES: usize = LitPass::ALL.len() + 1;
+
 /// The light counts of one frame, by pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct PassCounts([LightCount; LitPass::ALL.len()]);
+pub(crate) struct PassCounts([LightCount; PASSES]);
+
+impl CountedPass {
+    fn all() -> [Self; PASSES] {
+        std::array::from_fn(|index| {
+            LitPass::ALL.get(index).map_or(Self::DeferredLighting, |pass| Self::Drawn(*pass))
+        })
+    }
+
+    fn index(self) -> usize {
+        match self {
+            Self::Drawn(pass) => pass as usize,
+            Self::DeferredLighting => LitPass::ALL.len(),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Drawn(pass) => pass.name(),
+            Self::DeferredLighting => g_buffer::COMPUTE_PASS,
+        }
+    }
+}
 
 /// The buffer that passes count into, and copies of it that are being read back.
 #[derive(Debug, Default)]
@@ -80,21 +113,24 @@ impl CountedStages {
 }
 
 impl PassCounts {
-    /// Returns the counts of the pass with this name, if that pass draws lit surfaces.
+    /// Returns the counts of the pass with this name, if that pass lights surfaces.
     pub fn of(&self, pass: &str) -> Option<LightCount> {
-        LitPass::ALL.into_iter().find(|lit| lit.name() == pass).map(|lit| self.0[lit as usize])
+        CountedPass::all()
+            .into_iter()
+            .find(|counted| counted.name() == pass)
+            .map(|counted| self.0[counted.index()])
     }
 
     fn read(bytes: &[u8]) -> Self {
-        let of = |pass: LitPass| {
-            let begin = pass as usize * STRIDE as usize;
+        let of = |pass: CountedPass| {
+            let begin = pass.index() * STRIDE as usize;
             let words: [u64; WORDS] = std::array::from_fn(|word| {
                 let at = begin + 4 * word;
                 u64::from(u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
             });
             LightCount { tested: words[0] | words[1] << 32, contributing: words[2] | words[3] << 32 }
         };
-        Self(LitPass::ALL.map(of))
+        Self(CountedPass::all().map(of))
     }
 }
 
@@ -106,12 +142,12 @@ impl LightCounter {
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
             buffer(gpu, "light counts", usage)
         });
-        gpu.queue.write_buffer(counts, 0, &[0; (STRIDE as usize) * LitPass::ALL.len()]);
+        gpu.queue.write_buffer(counts, 0, &[0; (STRIDE as usize) * PASSES]);
     }
 
     /// Returns the binding of a pass's counts; `None` before [`begin`](Self::begin).
-    pub fn binding(&self, pass: LitPass) -> Option<wgpu::BufferBinding<'_>> {
-        let (offset, size) = (pass as u64 * STRIDE, wgpu::BufferSize::new(4 * WORDS as u64));
+    pub fn binding(&self, pass: CountedPass) -> Option<wgpu::BufferBinding<'_>> {
+        let (offset, size) = (pass.index() as u64 * STRIDE, wgpu::BufferSize::new(4 * WORDS as u64));
         self.counts.as_ref().map(|buffer| wgpu::BufferBinding { buffer, offset, size })
     }
 
@@ -161,7 +197,7 @@ impl LightCounter {
 }
 
 fn buffer(gpu: &Gpu, label: &str, usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    let size = STRIDE * LitPass::ALL.len() as u64;
+    let size = STRIDE * PASSES as u64;
     let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
     gpu.device.create_buffer(&descriptor)
 }
@@ -172,13 +208,17 @@ mod tests {
 
     #[test]
     fn counts_have_64_bits_and_stand_by_their_pass() {
-        let mut bytes = vec![0; LitPass::ALL.len() * STRIDE as usize];
+        let mut bytes = vec![0; PASSES * STRIDE as usize];
         bytes[STRIDE as usize..][..16]
             .copy_from_slice(&[1, 0, 0, 0, 2, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 0]);
         let counts = PassCounts::read(&bytes);
         let forward = LightCount { tested: (2 << 32) + 1, contributing: 0xffff_ffff };
         assert_eq!(counts.of("forward"), Some(forward));
         assert_eq!(counts.of("lightmap"), Some(LightCount::default()));
+        assert_eq!(counts.of("deferred lighting"), Some(LightCount::default()));
         assert_eq!(counts.of("display"), None);
+        let last = 4 * STRIDE as usize;
+        bytes[last..][..4].copy_from_slice(&[7, 0, 0, 0]);
+        assert_eq!(PassCounts::read(&bytes).of("deferred lighting").map(|count| count.tested), Some(7));
     }
 }

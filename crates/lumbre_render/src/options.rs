@@ -90,10 +90,10 @@ pub enum LightLists {
 pub enum RenderingPath {
     /// Deferred if many lights meet small triangles and no lightmaps: on a software rasterizer with at least 64
     /// lights that fragments find by clusters and one triangle for every 16 pixels of the frame, on a GPU with
-    /// 1024 lights and a triangle for every 32 pixels, where compute shaders then light the G-buffer. Otherwise forward. Whole blocks of pixels are shaded for
-    /// each triangle, and a small triangle fills little of a block. For the same reason a software rasterizer adds
-    /// the refracted light of surfaces with 64 triangles or more pixel by pixel, if the scene's refractive surfaces
-    /// have so many on average.
+    /// 1024 lights and a triangle for every 32 pixels, where compute shaders then light the G-buffer. Otherwise
+    /// forward. Whole blocks of pixels are shaded for each triangle, and a small triangle fills little of a block.
+    /// For the same reason a software rasterizer adds the refracted light of surfaces with 64 triangles or more pixel
+    /// by pixel, if the scene's refractive surfaces have so many on average.
     #[default]
     Auto,
     /// Each surface is lit while it is drawn, and refracted light is added triangle by triangle.
@@ -106,9 +106,9 @@ pub enum RenderingPath {
     /// deferred. Refracted light of surfaces with 64 triangles or more is added pixel by pixel,
     /// unless there are several samples.
     Deferred,
-    /// Like `Deferred`, but the G-buffer is lit in compute shaders, and a full-screen triangle then draws what they
-    /// found. A GPU runs these on all of its multiprocessors; fragments it may run on a few only, as cards for data
-    /// centres do. The picture is that of `Deferred`.
+    /// Like `Deferred`, but compute shaders light the G-buffer, and a full-screen triangle then copies the result
+    /// into the frame. A GPU runs compute shaders on all of its compute units, but fragment shaders possibly on a few
+    /// only, as cards for data centres do. The picture is that of `Deferred` up to rounding.
     DeferredCompute,
 }
 

@@ -73,7 +73,7 @@ pub(crate) struct Pipelines {
     shadow_layout: wgpu::BindGroupLayout,
     volume_layout: wgpu::BindGroupLayout,
     g_buffer_layout: wgpu::BindGroupLayout,
-    compute_layout: wgpu::BindGroupLayout,
+    g_buffer_compute_layout: wgpu::BindGroupLayout,
     tables: TableAccess,
     modules: Modules,
     pipelines: HashMap<PipelineKey, Pending<Pipeline>>,
@@ -92,7 +92,7 @@ impl Pipelines {
             shadow_layout: shadows::receiver_layout(gpu),
             volume_layout: irradiance_volumes::layout(gpu),
             g_buffer_layout: g_buffer::layout(gpu),
-            compute_layout: g_buffer::compute_layout(gpu),
+            g_buffer_compute_layout: g_buffer::compute_layout(gpu),
             tables: TableAccess {
                 in_textures: gpu.reads_tables_from_textures(),
                 shared: can_share_records(gpu),
@@ -123,8 +123,8 @@ impl Pipelines {
     }
 
     /// Returns the layout of group 1, for variants that light from the G-buffer in a compute shader.
-    pub fn compute_layout(&self) -> &wgpu::BindGroupLayout {
-        &self.compute_layout
+    pub fn g_buffer_compute_layout(&self) -> &wgpu::BindGroupLayout {
+        &self.g_buffer_compute_layout
     }
 
     /// Returns the number of shader variants compiled so far.
@@ -153,7 +153,7 @@ impl Pipelines {
     ) -> Result<bool, RenderError> {
         if !self.pipelines.contains_key(&key) {
             let textures = match key.variant.has(Feature::Deferred) {
-                true if key.variant.has(Feature::InCompute) => Some(self.compute_layout.clone()),
+                true if key.variant.has(Feature::InCompute) => Some(self.g_buffer_compute_layout.clone()),
                 true => Some(self.g_buffer_layout.clone()),
                 false => sets.layout(gpu, key.texture_mask),
             };

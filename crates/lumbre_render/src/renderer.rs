@@ -857,10 +857,11 @@ impl Renderer {
                 uploads.clusters += buffers.clusters.pending_bytes();
                 renewed.push(buffers.clusters.upload(&self.gpu));
             }
-            buffers.lit_classes.replace(draws.lit_classes(size));
+            buffers.lit_classes.replace(draws.dispatches(size).map(|(_, dispatch)| dispatch.class));
             if !buffers.lit_classes.values.is_empty() {
                 uploads.instances += buffers.lit_classes.pending_bytes();
-                renewed.push(buffers.lit_classes.upload(&self.gpu));
+                // The bind group that refers to it is made for each frame.
+                buffers.lit_classes.upload(&self.gpu)?;
             }
         }
         if renewed.iter().any(|renewed| !matches!(renewed, Ok(false))) {

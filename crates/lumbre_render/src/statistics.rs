@@ -2,6 +2,7 @@
 
 use lumbre_graph::ExecutionStages;
 
+use crate::g_buffer;
 use crate::lightmap_texels::LightmapMemory;
 use crate::shading_need::ShadingNeeds;
 
@@ -97,9 +98,11 @@ impl Uploads {
     }
 }
 
-/// The passes that draw lit surfaces.
+/// The passes that light surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct LitPasses {
+    /// Surfaces that compute shaders light from the G-buffer.
+    pub deferred_lighting: PassLights,
     /// Opaque surfaces with a lightmap.
     pub lightmap: PassLights,
     /// Opaque surfaces without one.
@@ -111,9 +114,10 @@ pub struct LitPasses {
 }
 
 impl LitPasses {
-    /// Returns the entry of the pass with this name, if that pass draws lit surfaces.
+    /// Returns the entry of the pass with this name, if that pass lights surfaces.
     pub fn of(&self, pass: &str) -> Option<&PassLights> {
         match pass {
+            g_buffer::COMPUTE_PASS => Some(&self.deferred_lighting),
             "lightmap" => Some(&self.lightmap),
             "forward" => Some(&self.forward),
             "refractive surfaces" => Some(&self.refraction),
@@ -123,12 +127,12 @@ impl LitPasses {
     }
 }
 
-/// What a pass draws, and the lights that its vertices or fragments test.
+/// What a pass lights, and the lights that its vertices, fragments or pixels test.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct PassLights {
     /// Objects in view.
     pub objects: usize,
-    /// Draw calls.
+    /// Draw calls, or dispatches of compute shaders.
     pub draws: usize,
     /// Number of different lights in the lists of its objects, and in the clusters' lists where its fragments
     /// read those.

@@ -103,7 +103,8 @@ impl TextureSets {
 
     /// Returns the layout of a lightmap's group.
     pub fn lightmap_layout(&mut self, gpu: &Gpu) -> wgpu::BindGroupLayout {
-        self.lightmap_layout.get_or_insert_with(|| layout_of(gpu, &[0], false)).clone()
+        let lit = wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE;
+        self.lightmap_layout.get_or_insert_with(|| layout_of(gpu, lit, &[0], false)).clone()
     }
 
     /// Returns the group of a lightmap, stored in this format.
@@ -140,22 +141,16 @@ fn make_layout(gpu: &Gpu, mask: u8) -> wgpu::BindGroupLayout {
     let first: Vec<u32> = (0..SLOTS.len() as u32).filter(|i| mask & (1 << i) != 0).map(|i| i * 2).collect();
     let reads_maps =
         |(feature, bound)| bound && matches!(feature, Feature::NormalTexture | Feature::OcclusionTexture);
-    layout_of(gpu, &first, features(mask).any(reads_maps))
+    layout_of(gpu, wgpu::ShaderStages::FRAGMENT, &first, features(mask).any(reads_maps))
 }
 
 /// Binding of `SurfaceMaps`, after all textures.
 const SURFACE_MAPS_BINDING: u32 = 10;
 
-/// Creates a layout with a texture and a sampler at each of these bindings, and the uniform of the surface
+/// Creates a layout with a texture and a sampler at each of these bindings for these stages, and the uniform of the surface
 /// maps if there are any.
-fn layout_of(gpu: &Gpu, first: &[u32], maps: bool) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        // Compute shaders light by lightmaps, too.
-        visibility: wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::COMPUTE,
-        ty,
-        count: None,
-    };
+fn layout_of(gpu: &Gpu, visibility: wgpu::ShaderStages, first: &[u32], maps: bool) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None };
     let texture = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Float { filterable: true },
         view_dimension: wgpu::TextureViewDimension::D2,

@@ -1,6 +1,6 @@
 //! The buffers that one view of a frame has for itself: its matrices, its clusters of lights, the classes of
-//! surfaces that compute shaders light, and the bind groups 0 that refer to them. What all views of a frame share (objects, materials, lights) belongs to the
-//! renderer.
+//! surfaces that compute shaders light, and the bind groups 0 that refer to them. What all views of a frame
+//! share (objects, materials, lights) belongs to the renderer.
 
 use std::collections::{HashMap, HashSet};
 
@@ -15,8 +15,8 @@ use crate::frame_bindings::{FrameBindings, FrameBuffer};
 use crate::g_buffer::LitClass;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{FrameData, radiance};
-use crate::light_counter::LightCounter;
-use crate::shader::Variant;
+use crate::light_counter::{CountedPass, LightCounter};
+use crate::shader::{Feature, Variant};
 
 /// The buffers of group 0 that all views of a frame share, as far as they exist.
 pub(crate) struct SharedBuffers<'a> {
@@ -33,14 +33,18 @@ pub(crate) struct SharedBuffers<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct FrameGroup {
     pub bindings: FrameBindings,
-    pub counted_in: Option<LitPass>,
+    pub counted_in: Option<CountedPass>,
 }
 
 impl FrameGroup {
     /// Returns the group that a variant needs in a pass.
     pub fn of(variant: &Variant, pass: LitPass) -> Self {
         let bindings = FrameBindings::of(variant);
-        Self { bindings, counted_in: bindings.count_lights().then_some(pass) }
+        let counted_in = match variant.has(Feature::InCompute) {
+            true => CountedPass::DeferredLighting,
+            false => CountedPass::Drawn(pass),
+        };
+        Self { bindings, counted_in: bindings.count_lights().then_some(counted_in) }
     }
 
     /// Returns the group of a variant that draws into the G-buffer.
@@ -112,7 +116,7 @@ impl ViewBuffers {
     pub fn bound<'a>(
         &'a self,
         buffer: FrameBuffer,
-        counted_in: Option<LitPass>,
+        counted_in: Option<CountedPass>,
         shared: &SharedBuffers<'a>,
     ) -> Option<wgpu::BindingResource<'a>> {
         match buffer {

@@ -8,7 +8,8 @@ use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Light, Material, Shading};
 use lumbre_render::{
-    Accounting, FrameOptions, Gpu, LightCount, Measure, Offscreen, OffscreenFormat, Renderer, wgpu,
+    Accounting, FrameOptions, Gpu, LightCount, LightLists, Measure, Offscreen, OffscreenFormat, Renderer,
+    RenderingPath, wgpu,
 };
 use lumbre_scene::{Camera, Mesh, Transform};
 
@@ -47,6 +48,33 @@ fn account(gpu: &Gpu, shading: Shading) -> Accounting {
         "the frame is drawn"
     );
     renderer.accounting().unwrap().clone()
+}
+
+/// Compute shaders light the G-buffer on a device with the default limits.
+#[test]
+fn a_device_with_default_limits_lights_in_compute_shaders() {
+    let gpu = device(wgpu::Features::empty(), 8);
+    let frames = [RenderingPath::Forward, RenderingPath::DeferredCompute].map(|rendering_path| {
+        let mut world = World::new();
+        world.spawn((Mesh::from(shapes::uv_sphere(1.0, 32, 16)), Material::matt(Vec3::ONE)));
+        let lamp = Light { shadow: true, ..Light::point(Vec3::splat(9.0)) };
+        world.spawn((lamp.with_range(9.0), Transform::from_xyz(1.0, 2.0, 3.0)));
+        world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 5.0)));
+        let options = FrameOptions {
+            rendering_path,
+            light_lists: LightLists::Clusters,
+            shading: Some(Shading::Phong),
+            ..FrameOptions::default()
+        };
+        let target = Offscreen::new(&gpu, SIDE, SIDE, OffscreenFormat::Rgba8).unwrap();
+        let report = Renderer::new(&gpu).render(&mut world, &target.target(), &options).unwrap();
+        gpu.check().unwrap();
+        let in_compute = rendering_path == RenderingPath::DeferredCompute;
+        assert_eq!(report.plan.status("deferred lighting").is_some_and(|pass| pass.runs()), in_compute);
+        target.read_rgba8(&gpu).unwrap()
+    });
+    let apart = frames[0].iter().zip(&frames[1]).map(|(a, b)| a.abs_diff(*b)).max();
+    assert!(frames[0].iter().any(|value| *value > 100) && apart <= Some(1), "{apart:?}");
 }
 
 fn forward(accounting: &Accounting) -> Option<LightCount> {

@@ -42,7 +42,11 @@ fn effects(ui: &mut Ui, accounting: &Accounting) {
             ui.label(&effect.effect);
             ui.label(format!("{:.2}", effect.cpu_ms));
             ui.label(effect.gpu_ms.map_or_else(String::new, |ms| format!("{ms:.2}")));
-            ui.label(effect.invocations.map_or_else(String::new, |counts| short_count(counts.fragment)));
+            ui.label(
+                effect
+                    .invocations
+                    .map_or_else(String::new, |counts| short_count(counts.fragment + counts.compute)),
+            );
             let but_zero = |count: u64| if count == 0 { String::new() } else { count.to_string() };
             ui.label(but_zero(effect.uploaded_bytes));
             ui.label(but_zero(effect.pipelines_made as u64));

@@ -1,11 +1,11 @@
-//! Draws the pixels that compute shaders have lit from the G-buffer into the frame: a triangle over the whole
-//! frame, which leaves out pixels without a deferred surface. Not their lighting, which is in
+//! Draws the pixels that compute shaders have lit from the G-buffer into the frame: a triangle behind all
+//! surfaces, which leaves out pixels without a deferred surface. Not their lighting, which is in
 //! shaders/deferred_lighting.wesl. Twin of the bindings: shaders/deferred_composite.wesl.
 
 use std::collections::HashMap;
 
 use crate::error::EffectError;
-use crate::g_buffer::{self, TEXTURE_BINDING};
+use crate::g_buffer;
 use crate::pending::Pending;
 use crate::{Gpu, RenderError, full_screen, shader};
 
@@ -51,7 +51,6 @@ impl Composites {
 
 impl Composite {
     fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Result<Self, RenderError> {
-        let entry = |binding, ty| g_buffer::entry(wgpu::ShaderStages::FRAGMENT, binding, ty);
         let lit = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Float { filterable: false },
             view_dimension: wgpu::TextureViewDimension::D2,
@@ -59,7 +58,7 @@ impl Composite {
         };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some(NAME),
-            entries: &[entry(0, TEXTURE_BINDING), entry(1, lit)],
+            entries: &[g_buffer::entry(wgpu::ShaderStages::FRAGMENT, 0, lit)],
         });
         let module = shader::compile(device, "deferred_composite", &[])?;
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -68,25 +67,26 @@ impl Composite {
             immediate_size: 0,
         });
         let pipeline =
-            full_screen::pipeline_beside_depth(device, NAME, &module, Some(&pipeline_layout), format);
+            full_screen::pipeline_behind_surfaces(device, NAME, &module, Some(&pipeline_layout), format);
         Ok(Self { layout, pipeline })
     }
 
-    /// Draws the lit pixels, in a pass with a depth buffer.
+    /// Draws the lit pixels, in a pass with a depth buffer. `parallel` says whether the lines of sight are.
     pub fn draw(
         &self,
         device: &wgpu::Device,
         pass: &mut wgpu::RenderPass<'static>,
-        surfaces: &wgpu::TextureView,
         lit_pixels: &wgpu::TextureView,
+        parallel: bool,
     ) {
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(NAME),
             layout: &self.layout,
-            entries: &[g_buffer::texture(0, surfaces), g_buffer::texture(1, lit_pixels)],
+            entries: &[g_buffer::texture(0, lit_pixels)],
         });
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
-        pass.draw(0..3, 0..1);
+        let parallel = u32::from(parallel);
+        pass.draw(0..3, parallel..parallel + 1);
     }
 }

@@ -17,9 +17,6 @@ use crate::frame_scene::FrameScene;
 use crate::g_buffer::{self, GBufferContents};
 use crate::{FrameOptions, Gpu};
 
-/// The pass that lights the G-buffer in compute shaders.
-const COMPUTE_PASS: &str = "deferred lighting";
-
 #[derive(Debug, Default)]
 pub(super) struct GBufferPass {
     contents: Option<GBufferContents>,
@@ -105,7 +102,7 @@ impl Effect for GBufferPass {
         let mut g_buffer = GBuffer { surfaces, details, lit: None };
         if contents.lit_in_compute {
             let mut pixels = board.texture(graph, "lit pixels", g_buffer::LIT_FORMAT);
-            let pass = board.lit(graph.compute_pass(COMPUTE_PASS));
+            let pass = board.lit(graph.compute_pass(g_buffer::COMPUTE_PASS));
             let pass = g_buffer.textures().fold(pass, |pass, texture| pass.samples(&texture));
             let from = g_buffer.clone();
             pass.writes(&mut pixels, TextureWrite::Storage)
@@ -144,8 +141,8 @@ impl GBuffer {
 
     /// Returns the textures that passes of opaque surfaces read.
     fn read_by_opaque_passes(&self) -> impl Iterator<Item = TextureHandle> {
-        let second = self.lit.as_ref().map_or(self.details, |lit| Some(lit.pixels));
-        [Some(self.surfaces), second].into_iter().flatten()
+        let fragments_read = [Some(self.surfaces), self.details];
+        self.lit.as_ref().map_or(fragments_read, |lit| [Some(lit.pixels), None]).into_iter().flatten()
     }
 
     /// Lights the surfaces of all passes in compute shaders.
@@ -159,7 +156,7 @@ impl GBuffer {
         let (surfaces, details) = self.views(&context.resources)?;
         let lit = (context.resources.view(pixels)?, classes);
         let device = context.resources.device;
-        let group = g_buffer::compute_group(device, scene.compute_layout(), surfaces, details, lit);
+        let group = g_buffer::compute_group(device, scene.g_buffer_compute_layout(), surfaces, details, lit);
         scene.light_in_compute(context.pass, &group);
         Ok(())
     }
@@ -176,10 +173,9 @@ impl GBuffer {
         }
         if let Some(LitPixels { pixels, composite }) = &self.lit {
             let drawn_before = lit_pass == LitPass::Forward && scene.lights_deferred(LitPass::Lightmap);
-            let view = |handle: &TextureHandle| context.resources.view(handle);
             if let Some(composite) = composite.as_ref().filter(|_| !drawn_before) {
-                let (surfaces, pixels) = (view(&self.surfaces)?, view(pixels)?);
-                composite.draw(context.resources.device, context.pass, surfaces, pixels);
+                let pixels = context.resources.view(pixels)?;
+                composite.draw(context.resources.device, context.pass, pixels, scene.is_parallel());
             }
             return Ok(());
         }

@@ -43,16 +43,15 @@ mod tests {
     use lumbre_optics::{ReflectionModel, Shading};
 
     use super::{tested_early, to_wgsl};
+    use crate::extract::LitPass;
+    use crate::g_buffer::{DeferredVariants, GBufferContents};
     use crate::shader::{Feature, TableAccess, Variant};
 
     /// Returns the WGSL of a variant for a device with storage buffers. naga has validated it, and also that
     /// for a device whose fragments load records for each other.
     fn valid(variant: &Variant) -> Arc<str> {
         let shared = valid_with(variant, TableAccess { in_textures: true, shared: true });
-        let shares = variant.has(Feature::Lights)
-            && variant.shading == Shading::Phong
-            && !variant.has(Feature::CountLights)
-            && !variant.has(Feature::GBuffer);
+        let shares = variant.shares_records();
         assert_eq!(shared.contains("subgroup"), shares, "{variant}:\n{shared}");
         let plain = valid_with(variant, TableAccess::default());
         assert!(!plain.contains("subgroup"), "{variant}:\n{plain}");
@@ -60,8 +59,8 @@ mod tests {
     }
 
     fn valid_with(variant: &Variant, tables: TableAccess) -> Arc<str> {
-        let mut source = to_wgsl("forward", &variant.flags(tables)).unwrap();
-        if variant.has(Feature::CountLights) {
+        let mut source = to_wgsl(variant.module(), &variant.flags(tables)).unwrap();
+        if variant.has(Feature::CountLights) && variant.module() == "forward" {
             source = tested_early(&source).into();
             assert_eq!(source.matches("@early_depth_test(force) @fragment").count(), 1, "{source}");
         }
@@ -83,6 +82,58 @@ mod tests {
         let mut variant = Variant::new(shading, ReflectionModel::Blinn);
         features.iter().for_each(|feature| variant.set(*feature, true));
         variant.reduced()
+    }
+
+    /// Deferred lighting of what a frame can have, in fragments and in compute shaders, for devices with buffers and
+    /// for those with textures. What only a device with buffers has is not run on a software rasterizer.
+    #[test]
+    fn every_deferred_surface_has_valid_shaders_on_every_device() {
+        let clusters = [
+            Feature::InverseSquareClusters,
+            Feature::InverseSquareSpots,
+            Feature::RangedClusters,
+            Feature::SpotLights,
+            Feature::LocalViewer,
+        ];
+        let shadows = [
+            Feature::ShadowedClusters,
+            Feature::Shadows,
+            Feature::ShadowCubes,
+            Feature::ShadowCascades,
+            Feature::SoftShadows,
+            Feature::StaticLights,
+            Feature::DirectionalLights,
+        ];
+        let fog = [Feature::Fog, Feature::FogLinear, Feature::TwoSided, Feature::HalfRange];
+        let tinted = [Feature::Uv0, Feature::BaseColorTexture, Feature::VertexColor];
+        let shown = [Feature::Display, Feature::DisplaySrgb, Feature::EncodeSrgb];
+        let lightmap = [Feature::Lightmap, Feature::Uv1, Feature::StaticLights, Feature::BakedMetal];
+        let volume = [Feature::IrradianceVolume, Feature::PolygonLights];
+        let sets: [&[Feature]; 9] = [
+            &[],
+            &clusters,
+            &shadows,
+            &fog,
+            &tinted,
+            &shown,
+            &lightmap,
+            &volume,
+            &[Feature::InverseSquareClusters, Feature::UniformLights, Feature::CountLights],
+        ];
+        let contents = [false, true].map(|lit_in_compute| GBufferContents { details: true, lit_in_compute });
+        for features in sets {
+            let all: Vec<_> = LIT.into_iter().chain(clusters).chain(features.iter().copied()).collect();
+            for forward in [LIT.iter().chain(features).copied().collect(), all] {
+                let forward = variant(Shading::Phong, &forward);
+                for contents in contents {
+                    let of = DeferredVariants::of(&forward, LitPass::Forward, Some(contents)).unwrap();
+                    let wgsl = valid(&of.lighting);
+                    assert_eq!(wgsl.contains("@compute"), contents.lit_in_compute, "{wgsl}");
+                    assert_eq!(wgsl.contains("@fragment"), !contents.lit_in_compute, "{wgsl}");
+                    valid(&of.geometry);
+                }
+            }
+        }
     }
 
     const LIT: [Feature; 3] = [Feature::Lit, Feature::DynamicLights, Feature::PointLights];
@@ -112,8 +163,10 @@ mod tests {
             }
             _ => vec![],
         };
+        // Those of deferred shading come together: see the test below.
+        let deferred = [Feature::GBuffer, Feature::GBufferDetails, Feature::Deferred, Feature::InCompute];
         for shading in Shading::ALL {
-            for feature in Feature::ALL {
+            for feature in Feature::ALL.iter().filter(|feature| !deferred.contains(feature)) {
                 let features: Vec<_> = LIT.into_iter().chain(with(*feature)).chain([*feature]).collect();
                 valid(&variant(*shading, &features));
             }

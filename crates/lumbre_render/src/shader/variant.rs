@@ -387,7 +387,7 @@ impl Variant {
 
     /// Returns true if its fragments load records for each other on a device that can do that. Fragments that
     /// count lights do not: each counts those of its own lists. Nor do compute shaders, which are for GPUs.
-    fn shares_records(&self) -> bool {
+    pub(super) fn shares_records(&self) -> bool {
         self.shading == Shading::Phong
             && self.has(Feature::Lights)
             && !self.has(Feature::CountLights)
