@@ -488,7 +488,7 @@ fn what_compute_shaders_lit_in_an_earlier_frame_is_gone() {
     let passing = world.spawn((Mesh::from(ball()), shiny(0.9, 0.2, 0.1), near)).id();
     let mut renderer = Renderer::builder().with(Curtain).build(gpu());
     let frame = Offscreen::new(gpu(), SIZE.0, SIZE.1, OffscreenFormat::LinearFloat).unwrap();
-    let mut drawn = |world: &mut World, renderer: &mut Renderer| {
+    let drawn = |world: &mut World, renderer: &mut Renderer| {
         renderer.render(world, &frame.target(), &by(RenderingPath::DeferredCompute)).unwrap();
         frame.read_linear(gpu()).unwrap()
     };
