@@ -17,7 +17,7 @@ use lumbre_scene::{
     AmbientCube, Camera, DynamicObject, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
     MaterialTextures, Mesh, Projection, SceneSettings, Transform,
 };
-use lumbre_tests::device::{apart_by_moved_corners, filter_step};
+use lumbre_tests::device::{apart_by_moved_corners, filter_step, same_by_another_pipeline};
 use lumbre_tests::panes::{image, sharp};
 
 use crate::adapter::{Canvas, draw, gpu, linear};
@@ -28,10 +28,6 @@ use crate::adapter::{Canvas, draw, gpu, linear};
 const ROUNDING: f64 = 6e-5;
 /// The same where textures or vertex colours modulate light: they are stored with a relative error of 2^-13.
 const TINTED: f64 = 1.22e-4 + ROUNDING;
-
-/// The largest accepted difference between light of compute shaders and of fragments, which evaluate the same
-/// expressions: that of two compilations, of which a processor's fragments load records for each other.
-const BETWEEN_STAGES: f64 = 1e-5;
 
 const SIZE: (u32, u32) = (131, 83);
 
@@ -62,8 +58,7 @@ fn difference(world: &mut World, options: &FrameOptions) -> (f64, FrameReport) {
     assert!(deferred.plan.status("deferred lighting").is_none());
     assert!(in_compute.plan.status("deferred lighting").unwrap().runs());
     assert_eq!(deferred.statistics.draws, in_compute.statistics.draws);
-    let apart = largest_difference(&got, &computed);
-    assert!(apart <= BETWEEN_STAGES, "in compute shaders: {apart}");
+    assert!(same_by_another_pipeline(&computed, &got), "compute shaders light otherwise");
     (largest_difference(&expected, &got), deferred)
 }
 

@@ -2,40 +2,9 @@
 //! Not what they draw: display, planes of shadow maps, pixels that compute shaders have lit, and probes each have a
 //! shader of their own.
 
-use crate::target::DEPTH_FORMAT;
-
-/// Creates a pipeline without vertex buffers, depth or blending, for a target of one sample. Without a `layout`, the
-/// shader's bindings give it.
+/// Creates a pipeline without vertex buffers or blending, for a target of one sample, and for passes with a depth buffer
+/// if `depth_stencil` is given. Without a `layout`, the shader's bindings give it.
 pub(crate) fn pipeline(
-    device: &wgpu::Device,
-    label: &str,
-    module: &wgpu::ShaderModule,
-    layout: Option<&wgpu::PipelineLayout>,
-    format: wgpu::TextureFormat,
-) -> wgpu::RenderPipeline {
-    make(device, label, module, layout, (format, None))
-}
-
-/// Like [`pipeline`], for a pass with a depth buffer, which it does not write. Depth is reversed: with a triangle behind
-/// all surfaces, only pixels with a surface run the fragment shader.
-pub(crate) fn pipeline_behind_surfaces(
-    device: &wgpu::Device,
-    label: &str,
-    module: &wgpu::ShaderModule,
-    layout: Option<&wgpu::PipelineLayout>,
-    format: wgpu::TextureFormat,
-) -> wgpu::RenderPipeline {
-    let depth = wgpu::DepthStencilState {
-        format: DEPTH_FORMAT,
-        depth_write_enabled: Some(false),
-        depth_compare: Some(wgpu::CompareFunction::LessEqual),
-        stencil: Default::default(),
-        bias: Default::default(),
-    };
-    make(device, label, module, layout, (format, Some(depth)))
-}
-
-fn make(
     device: &wgpu::Device,
     label: &str,
     module: &wgpu::ShaderModule,

@@ -59,7 +59,7 @@ fn probe(gpu: &Gpu) -> Result<Vec<u8>, RenderError> {
     table.make_room(gpu, LABEL, (numbers.len(), entry_size))?;
     table.write(gpu, bytemuck::cast_slice(&numbers), entry_size, 0..numbers.len());
     let pipeline =
-        full_screen::pipeline(device, LABEL, &module, None, OffscreenFormat::Rgba8.texture_format());
+        full_screen::pipeline(device, LABEL, &module, None, (OffscreenFormat::Rgba8.texture_format(), None));
     // In a uniform buffer, an entry of an array takes sixteen bytes.
     let entries = numbers.map(|number| [number, 0, 0, 0]);
     let mut buffer = GrowableBuffer::uniform(LABEL, entries.len());

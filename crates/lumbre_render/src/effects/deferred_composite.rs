@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use crate::error::EffectError;
 use crate::g_buffer;
 use crate::pending::Pending;
+use crate::target::DEPTH_FORMAT;
 use crate::{Gpu, RenderError, full_screen, shader};
 
 const NAME: &str = "deferred composite";
@@ -27,20 +28,21 @@ pub(super) struct Composite {
 impl Composites {
     /// Returns the composite for a format, which is created if it does not exist.
     pub fn make(&mut self, gpu: &Gpu, format: wgpu::TextureFormat) -> Result<Composite, EffectError> {
-        let pending = self.made.entry(format).or_insert_with(|| {
-            let device = gpu.device.clone();
-            Pending::make(move || Ok(Composite::new(&device, format)?))
-        });
+        let pending = self.pending(gpu, format, true);
         pending.wait().cloned().map_err(|error| error.to_string().into())
     }
 
     /// Starts to create the composite for a format. Returns true if it exists.
     pub fn begin(&mut self, gpu: &Gpu, format: wgpu::TextureFormat) -> Result<bool, EffectError> {
-        let pending = self.made.entry(format).or_insert_with(|| {
+        Ok(self.pending(gpu, format, false).is_there(false)?)
+    }
+
+    fn pending(&mut self, gpu: &Gpu, format: wgpu::TextureFormat, wait: bool) -> &Pending<Composite> {
+        self.made.entry(format).or_insert_with(|| {
             let device = gpu.device.clone();
-            Pending::begin(gpu, move || Ok(Composite::new(&device, format)?))
-        });
-        Ok(pending.is_there(false)?)
+            let make = move || Ok(Composite::new(&device, format)?);
+            if wait { Pending::make(make) } else { Pending::begin(gpu, make) }
+        })
     }
 
     /// Returns the number of pipelines created so far.
@@ -66,8 +68,16 @@ impl Composite {
             bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
-        let pipeline =
-            full_screen::pipeline_behind_surfaces(device, NAME, &module, Some(&pipeline_layout), format);
+        // The triangle lies behind all surfaces, and depth is reversed: only pixels with a surface run the shader.
+        let depth = wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(false),
+            depth_compare: Some(wgpu::CompareFunction::LessEqual),
+            stencil: Default::default(),
+            bias: Default::default(),
+        };
+        let target = (format, Some(depth));
+        let pipeline = full_screen::pipeline(device, NAME, &module, Some(&pipeline_layout), target);
         Ok(Self { layout, pipeline })
     }
 

@@ -246,7 +246,7 @@ fn make(
         bind_group_layouts: &[Some(layout)],
         immediate_size: 0,
     });
-    Ok(full_screen::pipeline(device, "display", &module, Some(&pipeline_layout), format))
+    Ok(full_screen::pipeline(device, "display", &module, Some(&pipeline_layout), (format, None)))
 }
 
 /// Converts a colour to the values that the shaders write for a target of this format, in f64. Twin:

@@ -575,7 +575,7 @@ fn planes_pipeline(
         bind_group_layouts: &[Some(layout)],
         immediate_size: 0,
     });
-    Ok(full_screen::pipeline(device, NAME, &module, Some(&layout), PLANES_FORMAT))
+    Ok(full_screen::pipeline(device, NAME, &module, Some(&layout), (PLANES_FORMAT, None)))
 }
 
 impl OnDevice {
