@@ -3,6 +3,8 @@
 //! half under a box has the light of its open half. The result is independent of the bake's seed, unless the time is
 //! too short to classify all texels exactly.
 
+use std::collections::BTreeMap;
+
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -38,7 +40,7 @@ const POINT_RAYS: u32 = 8;
 /// the inside of a solid, they decide for everything there. They never decide for a part that is so small that it has
 /// fewer of these points than make [`POINT_RAYS`] rays together.
 const AGREEING_RAYS: u32 = 2;
-/// Distance from a contact line, in texels, below which a point is classified by itself.
+/// Distance from a contact line, in texels, below which a point lies on the line and may belong to either side.
 const LINE_MARGIN: f64 = 0.05;
 /// Rays that must be clear for an open point if another is blocked: where faces touch, a single ray may slip out
 /// between them.
@@ -240,21 +242,30 @@ fn classify(scene: &BakeScene, texel: &Texel, contacts: &ContactLines) -> OpenPo
     let mut rays =
         PointRays { scene, points: &points, sequence, clearance: min_clearance(scene, texel), cast: 0 };
     let knows_lines = has_all_lines(scene, texel);
-    let mut open = vec![0u64; points.len().div_ceil(64)];
-    let mut all_open = true;
-    for group in between_lines(&points, contacts.in_texel(texel.index)) {
-        let tested = corners_and_middle(&points, &group);
+    let Areas { areas, on_lines } = between_lines(&points, contacts.in_texel(texel.index));
+    let mut views: Vec<Option<PointView>> = vec![None; points.len()];
+    for area in &areas {
+        let tested = corners_and_middle(&points, area);
         let agreed = if knows_lines { rays.agreed_view(&tested) } else { None };
         let agreed = agreed.or_else(|| {
             let views: Vec<PointView> = tested.into_iter().map(|index| rays.view(index)).collect();
             if knows_lines { common_view(&views) } else { equal_view(&views) }
         });
-        for index in group {
-            if agreed.unwrap_or_else(|| rays.view(index)) == PointView::Open {
-                open[index / 64] |= 1 << (index % 64);
-            } else {
-                all_open = false;
-            }
+        for &index in area {
+            views[index] = Some(agreed.unwrap_or_else(|| rays.view(index)));
+        }
+    }
+    for (index, beside) in on_lines {
+        let beside: Vec<PointView> = beside.into_iter().filter_map(|point| views[point]).collect();
+        views[index] = Some(rays.view_on_line(index, if knows_lines { equal_view(&beside) } else { None }));
+    }
+    let mut open = vec![0u64; points.len().div_ceil(64)];
+    let mut all_open = true;
+    for (index, view) in views.into_iter().enumerate() {
+        if view == Some(PointView::Open) {
+            open[index / 64] |= 1 << (index % 64);
+        } else {
+            all_open = false;
         }
     }
     if all_open {
@@ -276,25 +287,56 @@ fn equal_view(views: &[PointView]) -> Option<PointView> {
     views.first().copied().filter(|first| views.iter().all(|view| view == first))
 }
 
-/// The points of a footprint, by index, in groups that no contact line divides. A point on a line is a group of its own.
-/// Lines are treated as infinite.
-fn between_lines(points: &[FootprintPoint], lines: impl Iterator<Item = [DVec2; 2]>) -> Vec<Vec<usize>> {
-    let mut groups: Vec<Vec<usize>> = vec![(0..points.len()).collect()];
-    for [from, to] in lines {
-        let Some(along) = (to - from).try_normalize() else { continue };
-        let distance = |index: &usize| along.perp_dot(points[*index].offset.as_dvec2() - from);
-        groups = groups
-            .into_iter()
-            .flat_map(|group| {
-                let (on_line, beside): (Vec<usize>, Vec<usize>) =
-                    group.into_iter().partition(|index| distance(index).abs() < LINE_MARGIN);
-                let (left, right) = beside.into_iter().partition(|index| distance(index) > 0.0);
-                on_line.into_iter().map(|index| vec![index]).chain([left, right])
-            })
-            .filter(|group| !group.is_empty())
-            .collect();
+/// The points of a footprint, by index, as contact lines divide them. Lines are treated as infinite.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct Areas {
+    /// The points of each area between lines.
+    areas: Vec<Vec<usize>>,
+    /// The points on lines, each with one point of every area that it may belong to.
+    on_lines: Vec<(usize, Vec<usize>)>,
+}
+
+/// Divides the points of a footprint along lines.
+fn between_lines(points: &[FootprintPoint], lines: impl Iterator<Item = [DVec2; 2]>) -> Areas {
+    let lines: Vec<[DVec2; 2]> =
+        lines.filter_map(|[from, to]| Some([from, (to - from).try_normalize()?])).collect();
+    let sides = |point: &FootprintPoint| -> Vec<Side> {
+        let side = |[from, along]: &[DVec2; 2]| {
+            let distance = along.perp_dot(point.offset.as_dvec2() - from);
+            match distance.abs() < LINE_MARGIN {
+                true => Side::OnLine,
+                false if distance > 0.0 => Side::Left,
+                false => Side::Right,
+            }
+        };
+        lines.iter().map(side).collect()
+    };
+    let mut areas: BTreeMap<Vec<Side>, Vec<usize>> = BTreeMap::new();
+    let mut on_lines = Vec::new();
+    for (index, point) in points.iter().enumerate() {
+        let sides = sides(point);
+        if sides.contains(&Side::OnLine) {
+            on_lines.push((index, sides));
+        } else {
+            areas.entry(sides).or_default().push(index);
+        }
     }
-    groups
+    let may_be_in = |point: &[Side], area: &[Side]| {
+        point.iter().zip(area).all(|(point, area)| *point == Side::OnLine || point == area)
+    };
+    let beside = |sides: &[Side]| {
+        areas.iter().filter(|(area, _)| may_be_in(sides, area)).map(|(_, points)| points[0]).collect()
+    };
+    let on_lines = on_lines.into_iter().map(|(index, sides)| (index, beside(&sides))).collect();
+    Areas { areas: areas.into_values().collect(), on_lines }
+}
+
+/// Where a point lies beside a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Side {
+    OnLine,
+    Right,
+    Left,
 }
 
 /// Classifies all points of a texel alike: as open if at least half of its test rays are clear.
@@ -384,6 +426,19 @@ impl PointRays<'_> {
         Some(if first? == RayEnd::Clear { PointView::Open } else { PointView::Hidden })
     }
 
+    /// The view of a point on a contact line, given the view that everything beside the line has in common, if it has.
+    /// The point has it too if its first rays agree: it may lie under something that is thinner than the line's margin.
+    fn view_on_line(&mut self, index: usize, beside: Option<PointView>) -> PointView {
+        if let Some(view @ (PointView::Open | PointView::Hidden)) = beside {
+            let expected = if view == PointView::Open { RayEnd::Clear } else { RayEnd::Inside };
+            let receiver = receiver(self.scene, &self.points[index]);
+            if (0..AGREEING_RAYS).all(|ray| self.ray(&receiver, index, ray) == expected) {
+                return view;
+            }
+        }
+        self.view(index)
+    }
+
     /// The view of a point, by fewer than [`POINT_RAYS`] rays where the first ones decide. The point is hidden if half
     /// of its rays hit the inside of a solid, or if too few are clear: none, or fewer than [`MIN_CLEAR`] where some are
     /// blocked.
@@ -424,12 +479,18 @@ mod tests {
     #[test]
     fn contact_lines_divide_the_points_of_a_texel() {
         let points = grid();
-        let sizes = |lines: &[[DVec2; 2]]| -> Vec<usize> {
-            let groups = between_lines(&points, lines.iter().copied());
-            let mut all: Vec<usize> = groups.iter().flatten().copied().collect();
+        let divided = |lines: &[[DVec2; 2]]| {
+            let divided = between_lines(&points, lines.iter().copied());
+            let on_lines = divided.on_lines.iter().map(|(index, _)| index);
+            let mut all: Vec<usize> = divided.areas.iter().flatten().chain(on_lines).copied().collect();
             all.sort_unstable();
-            assert_eq!(all, (0..points.len()).collect::<Vec<_>>(), "each point is in one group");
-            groups.iter().map(Vec::len).filter(|size| *size > 1).collect()
+            assert_eq!(all, (0..points.len()).collect::<Vec<_>>(), "each point is somewhere once");
+            divided
+        };
+        let sizes = |lines: &[[DVec2; 2]]| -> Vec<usize> {
+            let mut sizes: Vec<usize> = divided(lines).areas.iter().map(Vec::len).collect();
+            sizes.sort_unstable();
+            sizes
         };
         // The columns are at 1/16, 3/16, ...: the fourth is on the line at 0.4375, none on the one at 0.25.
         let upright = |x: f64| [DVec2::new(x, 0.2), DVec2::new(x, 0.9)];
@@ -439,6 +500,14 @@ mod tests {
         assert_eq!(sizes(&[upright(0.4375)]), [24, 32]);
         assert_eq!(sizes(&[upright(0.25), level(0.5)]), [8, 8, 24, 24]);
         assert_eq!(sizes(&[[DVec2::splat(0.5); 2]]), [64], "a line without length divides nothing");
+        // A point on a line may belong to either side, and one on the other line too to any of four areas.
+        let crossed = divided(&[upright(0.4375), level(0.4375)]);
+        assert_eq!(crossed.areas.len(), 4);
+        for (index, beside) in &crossed.on_lines {
+            let both = index % FINE as usize == 3 && index / FINE as usize == 3;
+            assert_eq!(beside.len(), if both { 4 } else { 2 }, "{index}");
+        }
+        assert_eq!(crossed.on_lines.len(), 15);
     }
 
     #[test]
@@ -454,6 +523,15 @@ mod tests {
             assert_eq!((rays.agreed_view(&tested[..3]), rays.cast), (None, 10));
             rays.cast = 0;
             assert_eq!((rays.view(tested[0]), rays.cast), (PointView::Open, 5));
+            rays.cast = 0;
+            // In the open, where both sides are; where they differ, or are said to be hidden, it is looked at by itself.
+            let mut on_line = |beside| {
+                rays.cast = 0;
+                (rays.view_on_line(tested[0], beside), rays.cast)
+            };
+            assert_eq!(on_line(Some(PointView::Open)), (PointView::Open, 2));
+            assert_eq!(on_line(None), (PointView::Open, 5));
+            assert_eq!(on_line(Some(PointView::Hidden)), (PointView::Open, 6));
         });
     }
 

@@ -54,14 +54,19 @@ impl SurfaceMaterial {
         *unlit || (black(front) && back.as_ref().is_none_or(black) && !metallic)
     }
 
+    /// The texture that its emission is multiplied by.
+    pub fn emissive_texture(&self) -> Option<&TextureReference> {
+        self.textures.as_ref()?.emissive.as_ref()
+    }
+
     /// Whether its emission varies within a triangle.
     pub fn emission_varies(&self) -> bool {
-        self.textures.as_ref().is_some_and(|textures| textures.emissive.is_some())
+        self.emissive_texture().is_some()
     }
 
     /// Number of texels of the emissive texture along the longest edge of a triangle; 0 without such a texture.
     pub fn emission_texels(&self, vertices: [u32; 3]) -> f32 {
-        let texture = self.textures.as_ref().and_then(|textures| textures.emissive.as_ref());
+        let texture = self.emissive_texture();
         let whole = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
         texture.map_or(0.0, |texture| self.texels(texture, vertices, whole).edge)
     }
@@ -145,9 +150,9 @@ impl SurfaceMaterial {
         if emission == Vec3::ZERO {
             return emission;
         }
-        let texture = self.textures.as_ref().and_then(|textures| textures.emissive.as_ref());
-        let factor =
-            texture.map_or(Vec3::ONE, |texture| self.read(texture, vertices, weights, true).truncate());
+        let factor = self
+            .emissive_texture()
+            .map_or(Vec3::ONE, |texture| self.read(texture, vertices, weights, true).truncate());
         clean(emission * factor)
     }
 
@@ -173,12 +178,21 @@ impl SurfaceMaterial {
 
     /// The texture's value at a point of a triangle; white if the mesh lacks the coordinates.
     fn read(&self, texture: &TextureReference, vertices: [u32; 3], weights: [f32; 3], srgb: bool) -> Vec4 {
+        let uv = self.texture_coordinates(texture, vertices, weights);
+        uv.map_or(Vec4::ONE, |uv| sample(texture, uv, srgb))
+    }
+
+    /// The coordinates in a texture of a point of a triangle, before the texture's own transform; `None` if the mesh lacks
+    /// them.
+    pub fn texture_coordinates(
+        &self,
+        texture: &TextureReference,
+        vertices: [u32; 3],
+        weights: [f32; 3],
+    ) -> Option<Vec2> {
         let coordinates = if texture.tex_coord == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
-        if coordinates.is_empty() {
-            return Vec4::ONE;
-        }
-        let uv: Vec2 = (0..3).map(|i| coordinates[vertices[i] as usize] * weights[i]).sum();
-        sample(texture, uv, srgb)
+        let at = |i: usize| coordinates[vertices[i] as usize] * weights[i];
+        (!coordinates.is_empty()).then(|| (0..3).map(at).sum())
     }
 }
 

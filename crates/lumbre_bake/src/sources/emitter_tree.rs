@@ -89,6 +89,9 @@ const NEGLIGIBLE: f32 = 0.003;
 /// it.
 pub(crate) const TERM_ERROR: f32 = 0.005;
 
+/// The number of nodes that take as long to visit as an emitter's exact light.
+const COST_OF_EMITTER: u32 = 8;
+
 /// Lamps whose common bounding sphere appears under at most this sine are treated as casting one shadow.
 const NARROW: f32 = 0.02;
 /// Nodes whose radius is more than this share of their distance are divided to find that of their emitters.
@@ -280,6 +283,12 @@ impl EmitterTree {
 
     /// Irradiance that a node brings to a receiver, ignoring occlusion.
     pub fn unoccluded(&self, emitters: &[Emitter], index: u32, receiver: &Receiver) -> Vec3 {
+        self.unoccluded_and_cost(emitters, index, receiver).0
+    }
+
+    /// The same, and what it costs: the number of nodes that are visited, where an emitter counts as
+    /// [`COST_OF_EMITTER`] nodes.
+    pub fn unoccluded_and_cost(&self, emitters: &[Emitter], index: u32, receiver: &Receiver) -> (Vec3, u32) {
         let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
         let light_of = |emitter: u32| {
             let emitter = &emitters[emitter as usize];
@@ -287,12 +296,14 @@ impl EmitterTree {
             emitter.radiance.as_dvec3() * (std::f64::consts::PI * factor)
         };
         if self.emitters(index) <= EXACT_EMITTERS {
-            return self.emitters_of(index).iter().map(|emitter| light_of(*emitter)).sum::<DVec3>().as_vec3();
+            let sum: DVec3 = self.emitters_of(index).iter().map(|emitter| light_of(*emitter)).sum();
+            return (sum.as_vec3(), COST_OF_EMITTER * self.emitters(index));
         }
-        let mut sum = DVec3::ZERO;
+        let (mut sum, mut cost) = (DVec3::ZERO, 0);
         let mut open = Vec::with_capacity(64);
         open.push(index);
         while let Some(index) = open.pop() {
+            cost += 1;
             let (node, bounds) = (&self.nodes[index as usize], &self.bounds[index as usize]);
             let towards = bounds.center - receiver.position;
             let height = towards.dot(receiver.normal);
@@ -313,6 +324,7 @@ impl EmitterTree {
             }
             let children = match node.kind {
                 NodeKind::Leaf(emitter) => {
+                    cost += COST_OF_EMITTER;
                     sum += light_of(emitter);
                     continue;
                 }
@@ -350,7 +362,7 @@ impl EmitterTree {
             let [near, far] = children;
             open.extend(if a > b { [far, near] } else { [near, far] });
         }
-        sum.as_vec3()
+        (sum.as_vec3(), cost)
     }
 
     /// Samples an emitter of a node by `u` in [0, 1), about in proportion to the light that it brings to the receiver.

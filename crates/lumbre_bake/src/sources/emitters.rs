@@ -4,10 +4,11 @@
 use std::collections::{BTreeMap, HashMap};
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::disjoint_sets::DisjointSets;
-use crate::scene::mean_of_points::{mean_of_points, pieces};
-use crate::scene::{BakeScene, SceneTriangle, Side, SurfaceMaterial, position_bits};
+use crate::scene::mean_of_points::{SubTriangle, mean_of_points, pieces};
+use crate::scene::{BakeScene, LitTexels, SceneTriangle, Side, SurfaceMaterial, position_bits};
 use crate::texel_index::MapIndex;
 
 /// A triangle of uniform radiance.
@@ -155,48 +156,65 @@ pub(crate) fn coarse_textures(scene: &BakeScene) -> Vec<String> {
     worst.into_iter().filter(|(_, sampling)| is_coarse(sampling)).map(warning).collect()
 }
 
-/// The emitters of the scene.
+/// The emitters of the scene, in the order of its triangles.
 pub(crate) fn emitters(scene: &BakeScene) -> Vec<Emitter> {
-    let mut emitters = Vec::new();
-    let coarsening = Coarsening::of(scene);
-    for (index, triangle) in scene.triangles.iter().enumerate().filter(|(_, t)| !t.is_hidden_duplicate) {
-        let surface = &scene.surfaces[triangle.surface as usize];
-        for side in [Side::Front, Side::Back] {
-            if scene.stop.is_cancelled() {
-                return emitters;
-            }
-            if side == Side::Back && !triangle.two_sided {
-                continue;
-            }
-            let EmissionSampling { pieces: count, points, .. } =
-                EmissionSampling::new(surface, triangle.vertices, coarsening);
-            pieces(count, |[p, q, r]| {
-                if scene.stop.is_cancelled() {
-                    return;
-                }
-                let radiance = mean_of_points(points, |(a, b)| {
-                    let u = p.0 + (q.0 - p.0) * a + (r.0 - p.0) * b;
-                    let v = p.1 + (q.1 - p.1) * a + (r.1 - p.1) * b;
-                    surface.emission(side, triangle.vertices, [1.0 - u - v, u, v])
-                });
-                if radiance == Vec3::ZERO {
-                    return;
-                }
-                let mut corners = [p, q, r].map(|(u, v)| triangle.position(u, v));
-                if side == Side::Back {
-                    corners.swap(1, 2);
-                }
-                emitters.push(Emitter {
-                    corners,
-                    corners_f64: corners.map(|corner| corner.as_dvec3()),
-                    normal: triangle.side_normal(side),
-                    area: triangle.area / (count * count) as f32,
-                    radiance,
-                    triangle: index as u32,
-                    side,
-                });
-            });
+    let (coarsening, lit) = (Coarsening::of(scene), LitTexels::of(&scene.surfaces));
+    let of_triangle = |index: usize| {
+        let triangle = &scene.triangles[index];
+        let mut emitters = Vec::new();
+        if !triangle.is_hidden_duplicate {
+            add_emitters(scene, index, Side::Front, (coarsening, &lit), &mut emitters);
         }
+        if !triangle.is_hidden_duplicate && triangle.two_sided {
+            add_emitters(scene, index, Side::Back, (coarsening, &lit), &mut emitters);
+        }
+        emitters
+    };
+    (0..scene.triangles.len()).into_par_iter().flat_map_iter(of_triangle).collect()
+}
+
+/// Adds the emitters of a side of a triangle.
+fn add_emitters(
+    scene: &BakeScene,
+    index: usize,
+    side: Side,
+    (coarsening, lit): (Coarsening, &LitTexels),
+    emitters: &mut Vec<Emitter>,
+) {
+    let triangle = &scene.triangles[index];
+    let surface = &scene.surfaces[triangle.surface as usize];
+    let may_shine =
+        |piece: SubTriangle| !scene.stop.is_cancelled() && lit.may_shine(surface, triangle.vertices, piece);
+    if !may_shine([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]) {
+        return;
     }
-    emitters
+    let EmissionSampling { pieces: count, points, .. } =
+        EmissionSampling::new(surface, triangle.vertices, coarsening);
+    pieces(count, |piece| {
+        if !may_shine(piece) {
+            return;
+        }
+        let [p, q, r] = piece;
+        let radiance = mean_of_points(points, |(a, b)| {
+            let u = p.0 + (q.0 - p.0) * a + (r.0 - p.0) * b;
+            let v = p.1 + (q.1 - p.1) * a + (r.1 - p.1) * b;
+            surface.emission(side, triangle.vertices, [1.0 - u - v, u, v])
+        });
+        if radiance == Vec3::ZERO {
+            return;
+        }
+        let mut corners = piece.map(|(u, v)| triangle.position(u, v));
+        if side == Side::Back {
+            corners.swap(1, 2);
+        }
+        emitters.push(Emitter {
+            corners,
+            corners_f64: corners.map(|corner| corner.as_dvec3()),
+            normal: triangle.side_normal(side),
+            area: triangle.area / (count * count) as f32,
+            radiance,
+            triangle: index as u32,
+            side,
+        });
+    });
 }

@@ -147,6 +147,9 @@ pub(crate) const FEW_EMITTERS: u32 = 24;
 /// If the lamps' form factor from a receiver exceeds this, all lamps are sampled individually too, in groups: the sum
 /// over them is exact and little of it is hidden, while shared samples of near and large sources are noisy.
 const ENCLOSED: f32 = 0.5;
+/// Most that the unoccluded light of lamps of many emitters may cost at a point, as a number of nodes of the emitter tree:
+/// beyond it, shared samples reach the same error sooner.
+const MAX_COST: u32 = 512;
 /// Most nodes into which all lamps are grouped when they are all sampled individually.
 const MAX_GROUPS: usize = 16;
 /// Where sources are many, the fraction of all estimated light that a source must bring to be sampled individually.
@@ -317,6 +320,11 @@ impl Sources<'_> {
             return None;
         }
         let mut groups = tree.groups(receiver, MAX_GROUPS);
+        let large = groups.iter().filter(|&&group| tree.emitters(group) > EXACT_EMITTERS);
+        let cost: u32 = large.map(|&group| tree.unoccluded_and_cost(&self.emitters, group, receiver).1).sum();
+        if cost > MAX_COST {
+            return None;
+        }
         groups.sort_unstable();
         Some(groups)
     }
