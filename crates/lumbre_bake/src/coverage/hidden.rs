@@ -39,6 +39,7 @@ const POINT_RAYS: u32 = 8;
 /// Rays from each corner and from the middle of what lies between contact lines. If all of them are clear, or all hit
 /// the inside of a solid, they decide for everything there. They never decide for a part that is so small that it has
 /// fewer of these points than make [`POINT_RAYS`] rays together.
+/// The same number decides for a point on a line between areas that have the same view, if it confirms that view.
 const AGREEING_RAYS: u32 = 2;
 /// Distance from a contact line, in texels, below which a point lies on the line and may belong to either side.
 const LINE_MARGIN: f64 = 0.05;
@@ -243,7 +244,8 @@ fn classify(scene: &BakeScene, texel: &Texel, contacts: &ContactLines) -> OpenPo
         PointRays { scene, points: &points, sequence, clearance: min_clearance(scene, texel), cast: 0 };
     let knows_lines = has_all_lines(scene, texel);
     let Areas { areas, on_lines } = between_lines(&points, contacts.in_texel(texel.index));
-    let mut views: Vec<Option<PointView>> = vec![None; points.len()];
+    let mut views = vec![PointView::Hidden; points.len()];
+    let mut agreed_views = Vec::with_capacity(areas.len());
     for area in &areas {
         let tested = corners_and_middle(&points, area);
         let agreed = if knows_lines { rays.agreed_view(&tested) } else { None };
@@ -252,17 +254,21 @@ fn classify(scene: &BakeScene, texel: &Texel, contacts: &ContactLines) -> OpenPo
             if knows_lines { common_view(&views) } else { equal_view(&views) }
         });
         for &index in area {
-            views[index] = Some(agreed.unwrap_or_else(|| rays.view(index)));
+            views[index] = agreed.unwrap_or_else(|| rays.view(index));
         }
+        agreed_views.push(agreed);
     }
     for (index, beside) in on_lines {
-        let beside: Vec<PointView> = beside.into_iter().filter_map(|point| views[point]).collect();
-        views[index] = Some(rays.view_on_line(index, if knows_lines { equal_view(&beside) } else { None }));
+        // With an area on one side only, nothing is known of the other.
+        let beside: Option<Vec<PointView>> =
+            beside.into_iter().map(|area| agreed_views[area]).collect::<Option<_>>();
+        let beside = beside.filter(|views| knows_lines && views.len() > 1);
+        views[index] = rays.view_on_line(index, beside.and_then(|views| equal_view(&views)));
     }
     let mut open = vec![0u64; points.len().div_ceil(64)];
     let mut all_open = true;
     for (index, view) in views.into_iter().enumerate() {
-        if view == Some(PointView::Open) {
+        if view == PointView::Open {
             open[index / 64] |= 1 << (index % 64);
         } else {
             all_open = false;
@@ -292,7 +298,7 @@ fn equal_view(views: &[PointView]) -> Option<PointView> {
 struct Areas {
     /// The points of each area between lines.
     areas: Vec<Vec<usize>>,
-    /// The points on lines, each with one point of every area that it may belong to.
+    /// The points on lines, each with the areas that it may belong to, by their places in `areas`.
     on_lines: Vec<(usize, Vec<usize>)>,
 }
 
@@ -300,32 +306,33 @@ struct Areas {
 fn between_lines(points: &[FootprintPoint], lines: impl Iterator<Item = [DVec2; 2]>) -> Areas {
     let lines: Vec<[DVec2; 2]> =
         lines.filter_map(|[from, to]| Some([from, (to - from).try_normalize()?])).collect();
-    let sides = |point: &FootprintPoint| -> Vec<Side> {
+    let sides = |point: &FootprintPoint| -> Vec<LineSide> {
         let side = |[from, along]: &[DVec2; 2]| {
             let distance = along.perp_dot(point.offset.as_dvec2() - from);
             match distance.abs() < LINE_MARGIN {
-                true => Side::OnLine,
-                false if distance > 0.0 => Side::Left,
-                false => Side::Right,
+                true => LineSide::OnLine,
+                false if distance > 0.0 => LineSide::Left,
+                false => LineSide::Right,
             }
         };
         lines.iter().map(side).collect()
     };
-    let mut areas: BTreeMap<Vec<Side>, Vec<usize>> = BTreeMap::new();
+    let mut areas: BTreeMap<Vec<LineSide>, Vec<usize>> = BTreeMap::new();
     let mut on_lines = Vec::new();
     for (index, point) in points.iter().enumerate() {
         let sides = sides(point);
-        if sides.contains(&Side::OnLine) {
+        if sides.contains(&LineSide::OnLine) {
             on_lines.push((index, sides));
         } else {
             areas.entry(sides).or_default().push(index);
         }
     }
-    let may_be_in = |point: &[Side], area: &[Side]| {
-        point.iter().zip(area).all(|(point, area)| *point == Side::OnLine || point == area)
+    let may_be_in = |point: &[LineSide], area: &[LineSide]| {
+        point.iter().zip(area).all(|(point, area)| *point == LineSide::OnLine || point == area)
     };
-    let beside = |sides: &[Side]| {
-        areas.iter().filter(|(area, _)| may_be_in(sides, area)).map(|(_, points)| points[0]).collect()
+    let beside = |sides: &[LineSide]| {
+        let may_be_in = areas.keys().enumerate().filter(|(_, area)| may_be_in(sides, area));
+        may_be_in.map(|(place, _)| place).collect()
     };
     let on_lines = on_lines.into_iter().map(|(index, sides)| (index, beside(&sides))).collect();
     Areas { areas: areas.into_values().collect(), on_lines }
@@ -333,7 +340,7 @@ fn between_lines(points: &[FootprintPoint], lines: impl Iterator<Item = [DVec2; 
 
 /// Where a point lies beside a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Side {
+enum LineSide {
     OnLine,
     Right,
     Left,

@@ -139,14 +139,24 @@ impl SurfaceMaterial {
             .min(Vec3::splat(LARGEST_REFLECTANCE))
     }
 
-    /// Emitted radiance, W/(m² sr).
-    pub fn emission(&self, side: Side, vertices: [u32; 3], weights: [f32; 3]) -> Vec3 {
-        let emission = match (side, &self.material.back) {
+    /// The emitted radiance of a side before its texture, W/(m² sr).
+    fn emission_factor(&self, side: Side) -> Vec3 {
+        match (side, &self.material.back) {
             (Side::Front, _) => self.material.front.emission,
             (Side::Back, Some(back)) => back.emission,
             // Without a separate back material, a surface emits from its front only.
             (Side::Back, None) => Vec3::ZERO,
-        };
+        }
+    }
+
+    /// Whether a side emits light where its texture is not black.
+    pub fn emits(&self, side: Side) -> bool {
+        self.emission_factor(side) != Vec3::ZERO
+    }
+
+    /// Emitted radiance, W/(m² sr).
+    pub fn emission(&self, side: Side, vertices: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        let emission = self.emission_factor(side);
         if emission == Vec3::ZERO {
             return emission;
         }

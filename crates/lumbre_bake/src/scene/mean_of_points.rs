@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-/// SubTriangle of a piece, each by the barycentric weights of the triangle's second and third vertex.
+/// The corners of a piece, each by the barycentric weights of the triangle's second and third vertex.
 pub(crate) type SubTriangle = [(f32, f32); 3];
 
 /// Mean of `value` at the centroids of n² equal pieces of a triangle, given by the barycentric weights of its second

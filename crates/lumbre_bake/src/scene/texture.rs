@@ -30,8 +30,8 @@ pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
     top.lerp(bottom, fraction.y)
 }
 
-/// The largest whole number that is not above `x`. The standard library's is a call into the C library on processors
-/// without SSE 4.1, for which programs are compiled.
+/// The largest whole number that is not above `x`. Programs are compiled for processors without SSE 4.1 too, where the
+/// standard library's is a call into the C library.
 fn floor(x: f32) -> f32 {
     // From 2^23 on, all numbers are whole.
     if x.abs() < 8_388_608.0 {

@@ -78,7 +78,7 @@ struct Coarsening {
 struct EmissionSampling {
     /// Texels along the longest edge.
     texels: f32,
-    /// PolygonClipper along an edge.
+    /// Pieces along an edge.
     pieces: u32,
     /// Points along an edge of a piece.
     points: u32,
@@ -191,7 +191,7 @@ fn add_emitters(
     let EmissionSampling { pieces: count, points, .. } =
         EmissionSampling::new(surface, triangle.vertices, coarsening);
     pieces(count, |piece| {
-        if !may_shine(piece) {
+        if scene.stop.is_cancelled() || !may_shine(piece) {
             return;
         }
         let [p, q, r] = piece;

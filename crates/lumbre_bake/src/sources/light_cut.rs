@@ -137,19 +137,22 @@ impl LightCut {
     }
 }
 
-/// Up to this many lamps, all are sampled individually, except in their penumbrae: their exact light, or their exact unoccluded light times the
-/// visible fraction, is less noisy than shared samples.
+/// Up to this many lamps, all are sampled individually, except in their penumbrae and beyond [`MAX_COST`]: their exact
+/// light, or their exact unoccluded light times the visible fraction, is less noisy than shared samples.
 const FEW_LAMPS: u32 = 8;
 /// With more emitters than this in the scene, the lamps are never all sampled individually.
 const MAX_EMITTERS: u32 = 20_000;
 /// Where lamps are many, most emitters of a lamp that is sampled individually.
 pub(crate) const FEW_EMITTERS: u32 = 24;
-/// If the lamps' form factor from a receiver exceeds this, all lamps are sampled individually too, in groups: the sum
-/// over them is exact and little of it is hidden, while shared samples of near and large sources are noisy.
+/// If the lamps' form factor from a receiver exceeds this, all lamps are sampled individually too, in groups (up to
+/// [`MAX_COST_ENCLOSED`]): the sum over them is exact and little of it is hidden, while shared samples of near and large
+/// sources are noisy.
 const ENCLOSED: f32 = 0.5;
-/// Most that the unoccluded light of lamps of many emitters may cost at a point, as a number of nodes of the emitter tree:
-/// beyond it, shared samples reach the same error sooner.
+/// Most that the unoccluded light of lamps of many emitters may cost at a point of a texel, as a number of nodes of the
+/// emitter tree. Beyond it, shared samples reach the same error sooner, however few the lamps are.
 const MAX_COST: u32 = 512;
+/// The same where lamps fill most of what the receiver sees: there, shared samples are noisier.
+const MAX_COST_ENCLOSED: u32 = 1024;
 /// Most nodes into which all lamps are grouped when they are all sampled individually.
 const MAX_GROUPS: usize = 16;
 /// Where sources are many, the fraction of all estimated light that a source must bring to be sampled individually.
@@ -205,8 +208,9 @@ impl Sources<'_> {
         let has_few_lamps = few_lamps.is_some();
         match few_lamps {
             Some(lamps) => {
+                let costly = if reach > 0.0 { self.costly_lamps(&lamps, receiver) } else { Vec::new() };
                 let (sharing, individual): (Vec<u32>, _) =
-                    lamps.into_iter().partition(|lamp| shared.contains(lamp));
+                    lamps.into_iter().partition(|lamp| shared.contains(lamp) || costly.contains(lamp));
                 (cut.lamps, cut.has_all_lamps) = (individual, sharing.is_empty());
                 roots.extend(sharing.into_iter().map(Branch::Emitters));
             }
@@ -320,13 +324,30 @@ impl Sources<'_> {
             return None;
         }
         let mut groups = tree.groups(receiver, MAX_GROUPS);
-        let large = groups.iter().filter(|&&group| tree.emitters(group) > EXACT_EMITTERS);
-        let cost: u32 = large.map(|&group| tree.unoccluded_and_cost(&self.emitters, group, receiver).1).sum();
-        if cost > MAX_COST {
-            return None;
-        }
         groups.sort_unstable();
         Some(groups)
+    }
+
+    /// Those of a few lamps that share samples all the same, because their unoccluded light takes too long where the
+    /// points of a texel are many: the costliest of them, until the others cost no more than [`MAX_COST`] together, or
+    /// [`MAX_COST_ENCLOSED`] where lamps enclose the receiver.
+    fn costly_lamps(&self, lamps: &[u32], receiver: &Receiver) -> Vec<u32> {
+        let tree = &self.emitter_tree;
+        let mut costs: Vec<(u32, u32)> = lamps
+            .iter()
+            .filter(|&&lamp| tree.emitters(lamp) > EXACT_EMITTERS)
+            .map(|&lamp| (tree.unoccluded_and_cost(&self.emitters, lamp, receiver).1, lamp))
+            .collect();
+        let mut left: u32 = costs.iter().map(|(cost, _)| cost).sum();
+        let is_enclosed = tree.form_factor(receiver) > ENCLOSED;
+        let most = if is_enclosed { MAX_COST_ENCLOSED } else { MAX_COST };
+        costs.sort_unstable_by(|a, b| b.cmp(a));
+        let is_costly = |(cost, lamp): (u32, u32)| {
+            let is_costly = left > most;
+            left -= cost;
+            is_costly.then_some(lamp)
+        };
+        costs.into_iter().map_while(is_costly).collect()
     }
 
     /// Whether a node is one source that can be sampled individually.
@@ -373,4 +394,58 @@ impl Sources<'_> {
 fn has_simple_light(placed: &PlacedLight) -> bool {
     let has_cone = placed.light.spot.is_some_and(|cone| !cone.is_everywhere());
     placed.light.bake == BakeMode::Static && !placed.is_sized() && !has_cone
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use lumbre_mesh::shapes;
+
+    use super::*;
+    use crate::scene::Side;
+    use crate::scene::laid_out::mesh_laid_out;
+    use crate::sources::Emitter;
+    use crate::{BakeOptions, Density};
+
+    /// A lamp of columns x rows squares that faces down at a height of 1, two metres wide.
+    fn screen(columns: u16, rows: u16) -> Vec<Emitter> {
+        let side = 2.0 / f32::from(columns);
+        let square = |i: u16| {
+            let corner =
+                Vec3::new(f32::from(i % columns) * side - 1.0, 1.0, f32::from(i / columns) * side - 0.5);
+            let [a, b, c, d] =
+                [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 0.0, 1.0), Vec3::Z].map(|p| corner + p * side);
+            [[a, b, c], [a, c, d]]
+        };
+        let emitter = |corners: [Vec3; 3]| Emitter {
+            corners,
+            corners_f64: corners.map(|corner| corner.as_dvec3()),
+            normal: Vec3::NEG_Y,
+            area: 0.5 * side * side,
+            radiance: Vec3::ONE,
+            triangle: 0,
+            side: Side::Front,
+        };
+        (0..columns * rows).flat_map(square).map(emitter).collect()
+    }
+
+    #[test]
+    fn a_lamp_of_many_emitters_shares_samples_near_it_and_not_from_afar() {
+        let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
+        let (_, scene) = mesh_laid_out(shapes::plane(2.0, 2.0, 1, 1), &options);
+        let has_all_lamps = |emitters: Vec<Emitter>, height: f32, reach: f32| {
+            let sources = Sources::new(&scene, emitters, Vec::new(), Vec3::ZERO);
+            let position = Vec3::new(0.1, height, 0.1);
+            let receiver =
+                Receiver { position, origin: position, geometric_normal: Vec3::Y, normal: Vec3::Y };
+            let cut = sources.cut(&receiver, reach, &[]);
+            assert_eq!(cut.has_all_lamps, cut.shared.is_empty());
+            cut.has_all_lamps
+        };
+        let (many, few) = (|| screen(96, 48), || screen(6, 4));
+        assert!(!has_all_lamps(many(), 0.9, 0.01), "near");
+        assert!(has_all_lamps(many(), -30.0, 0.01), "from afar");
+        assert!(has_all_lamps(many(), 0.9, 0.0), "at a single point");
+        assert!(has_all_lamps(few(), 0.9, 0.01), "a lamp of few emitters");
+    }
 }

@@ -12,7 +12,7 @@ pub struct RendererBuilder {
 }
 
 impl RendererBuilder {
-    /// Adds an effect. Effects of the same [`Stage`] keep the order of these calls, after the built-in ones.
+    /// Adds an effect. Effects of the same [`Stage`](crate::effects::Stage) keep the order of these calls, after the built-in ones.
     #[must_use]
     pub fn with(mut self, effect: impl Effect + 'static) -> Self {
         self.effects.push(Box::new(effect));

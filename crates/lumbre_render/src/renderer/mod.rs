@@ -1,5 +1,6 @@
-//! The renderer, which draws a World into a target. It extracts the World, decides what the frame consists
-//! of, declares the render graph and runs it. Each of these steps has its own file.
+//! The renderer, which draws a World into a target: [`Renderer::render`] extracts the World, decides what the frame
+//! consists of (`decide`), makes the pipelines that it lacks (`pipelines`), uploads what it reads (`upload`), and
+//! declares and runs the render graph (`encode`). `builder` chooses the effects that a renderer has.
 
 mod builder;
 mod decide;
