@@ -152,7 +152,7 @@ const ENCLOSED: f32 = 0.5;
 /// emitter tree. Beyond it, shared samples reach the same error sooner, however few the lamps are.
 const MAX_COST: u32 = 512;
 /// The same where lamps fill most of what the receiver sees: there, shared samples are noisier.
-const MAX_COST_ENCLOSED: u32 = 1024;
+const MAX_COST_ENCLOSED: u32 = 2048;
 /// Most nodes into which all lamps are grouped when they are all sampled individually.
 const MAX_GROUPS: usize = 16;
 /// Where sources are many, the fraction of all estimated light that a source must bring to be sampled individually.
