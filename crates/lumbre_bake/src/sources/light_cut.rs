@@ -433,19 +433,22 @@ mod tests {
     fn a_lamp_of_many_emitters_shares_samples_near_it_and_not_from_afar() {
         let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
         let (_, scene) = mesh_laid_out(shapes::plane(2.0, 2.0, 1, 1), &options);
-        let has_all_lamps = |emitters: Vec<Emitter>, height: f32, reach: f32| {
+        let has_all_lamps = |emitters: Vec<Emitter>, [x, height]: [f32; 2], reach: f32| {
             let sources = Sources::new(&scene, emitters, Vec::new(), Vec3::ZERO);
-            let position = Vec3::new(0.1, height, 0.1);
+            let position = Vec3::new(x, height, 0.1);
             let receiver =
                 Receiver { position, origin: position, geometric_normal: Vec3::Y, normal: Vec3::Y };
             let cut = sources.cut(&receiver, reach, &[]);
             assert_eq!(cut.has_all_lamps, cut.shared.is_empty());
             cut.has_all_lamps
         };
-        let (many, few) = (|| screen(96, 48), || screen(6, 4));
-        assert!(!has_all_lamps(many(), 0.9, 0.01), "near");
-        assert!(has_all_lamps(many(), -30.0, 0.01), "from afar");
-        assert!(has_all_lamps(many(), 0.9, 0.0), "at a single point");
-        assert!(has_all_lamps(few(), 0.9, 0.01), "a lamp of few emitters");
+        // Beyond the edge of the lamp, where it does not enclose a receiver.
+        let (many, few, near) = (|| screen(136, 68), || screen(6, 4), [1.06, 0.95]);
+        assert!(!has_all_lamps(many(), near, 0.01), "near");
+        assert!(has_all_lamps(many(), [0.1, -30.0], 0.01), "from afar");
+        assert!(has_all_lamps(many(), near, 0.0), "at a single point");
+        assert!(has_all_lamps(few(), near, 0.01), "a lamp of few emitters");
+        // Right below it the limit is higher.
+        assert!(has_all_lamps(many(), [0.1, 0.85], 0.01) && !has_all_lamps(many(), [0.1, 0.95], 0.01));
     }
 }
