@@ -15,7 +15,7 @@ use lumbre_scene::{Camera, Lightmap, LightmapEncoding, LightmapImage, Mesh, Name
 
 use super::saved;
 
-fn tuned(world: World, goal: Goal, report: Option<&Path>) -> Tuned {
+fn tuning_of(world: World, goal: Goal, report: Option<&Path>) -> Tuned {
     let folder = tempfile::tempdir().unwrap();
     let file = saved(folder.path(), "level.glb", world);
     let gpu = Gpu::headless().expect("a Vulkan driver; the software one will do");
@@ -81,7 +81,7 @@ fn smooth_light() -> World {
 #[test]
 fn tuning_finds_a_planted_optimum() {
     let folder = tempfile::tempdir().unwrap();
-    let tuned = |goal: Goal, report: Option<&Path>| tuned(smooth_light(), goal, report);
+    let tuned = |goal: Goal, report: Option<&Path>| tuning_of(smooth_light(), goal, report);
     let report = folder.path().join("report");
     let is_planted = |chosen: &DrawSettings| chosen.shading == Shading::Gouraud && !chosen.multisample;
     let cheap = cheapest_within(0.01, |goal| tuned(goal, Some(&report)), is_planted);
@@ -130,7 +130,8 @@ fn glowing_slats() -> World {
 
 #[test]
 fn samples_are_taken_where_edges_want_them() {
-    let tuned = cheapest_within(0.05, |goal| tuned(glowing_slats(), goal, None), |chosen| chosen.multisample);
+    let tuned =
+        cheapest_within(0.05, |goal| tuning_of(glowing_slats(), goal, None), |chosen| chosen.multisample);
     let one = error_of(&tuned, |settings| !settings.multisample && settings.shading == Shading::Phong);
     assert!(one > 0.05, "without them it is off by {one}");
 }
@@ -168,8 +169,11 @@ fn floor_and_slats_apart() -> World {
 fn every_camera_has_a_say_though_few_are_timed() {
     // The most accurate frame has the slats' edges; the floor alone would do with one sample. The shading is left
     // open: where lamps end early, the objects that are not seen cost as much as light.
-    let tuned =
-        cheapest_within(0.01, |goal| tuned(floor_and_slats_apart(), goal, None), |chosen| chosen.multisample);
+    let tuned = cheapest_within(
+        0.01,
+        |goal| tuning_of(floor_and_slats_apart(), goal, None),
+        |chosen| chosen.multisample,
+    );
     let said =
         tuned.study.findings.iter().find(|said| said.contains("Of the 4 cameras")).expect("it is said");
     assert!(said.contains("frames take longest at \"eye\""), "{said}");
@@ -204,14 +208,14 @@ fn lamps_end_where_they_bring_nothing_and_go_on_where_they_do() {
     // 120 lamps of 0.05 / 60² each: together they contribute a hundredth of what one lamp does.
     cheapest_within(
         0.05,
-        |goal| tuned(lamps_afar((1, 4.0), 120), goal, None),
+        |goal| tuning_of(lamps_afar((1, 4.0), 120), goal, None),
         |chosen| chosen.light_threshold > 0.0,
     );
     // Lamps that contribute 0.4 % of white each, and all of the light together: wherever they end, it is
     // visible.
     let tuned = cheapest_within(
         0.05,
-        |goal| tuned(lamps_afar((20, 0.1), 0), goal, None),
+        |goal| tuning_of(lamps_afar((20, 0.1), 0), goal, None),
         |chosen| chosen.light_threshold == 0.0,
     );
     assert!(error_of(&tuned, |settings| settings.light_threshold > 0.0) > 0.05);
@@ -239,14 +243,18 @@ fn block_in_the_light(beside: f64, radius: f32) -> World {
 
 #[test]
 fn shadows_go_where_nobody_sees_them_and_lose_what_they_do_not_need() {
-    cheapest_within(0.01, |goal| tuned(block_in_the_light(9.0, 0.3), goal, None), |chosen| !chosen.shadows);
+    cheapest_within(
+        0.01,
+        |goal| tuning_of(block_in_the_light(9.0, 0.3), goal, None),
+        |chosen| !chosen.shadows,
+    );
     // The penumbra of a lamp of a millimetre is too small to be worth computing.
     let is_sharp = |chosen: &DrawSettings| chosen.shadows && chosen.shadow_filter != ShadowFilter::Soft;
-    let tuned = cheapest_within(0.08, |goal| tuned(block_in_the_light(0.0, 0.001), goal, None), is_sharp);
+    let tuned = cheapest_within(0.08, |goal| tuning_of(block_in_the_light(0.0, 0.001), goal, None), is_sharp);
     assert!(error_of(&tuned, |settings| !settings.shadows) > 0.08);
     // Without the penumbra of a wide lamp, the picture is wrong.
     let is_soft = |chosen: &DrawSettings| chosen.shadows && chosen.shadow_filter == ShadowFilter::Soft;
-    cheapest_within(0.02, |goal| tuned(block_in_the_light(0.0, 0.3), goal, None), is_soft);
+    cheapest_within(0.02, |goal| tuning_of(block_in_the_light(0.0, 0.3), goal, None), is_soft);
 }
 
 /// A floor whose baked light, in a map of 256 x 256 texels, is this over the map's columns.
@@ -277,7 +285,7 @@ fn lightmaps_lose_the_texels_that_their_light_does_not_need() {
     for goal in
         [Goal { milliseconds: None, error: Some(0.01) }, Goal { milliseconds: Some(1e6), error: None }]
     {
-        let tuned = tuned(smooth(), goal, None);
+        let tuned = tuning_of(smooth(), goal, None);
         let chosen = tuned.chosen.unwrap();
         let reduction = tuned.settings[chosen].lightmap_reduction;
         assert_eq!(reduction, 8, "{:?}", tuned.study.findings);
@@ -295,12 +303,12 @@ fn lightmaps_lose_the_texels_that_their_light_does_not_need() {
     for goal in
         [Goal { milliseconds: None, error: Some(0.05) }, Goal { milliseconds: Some(1e6), error: None }]
     {
-        let tuned = tuned(sharp(), goal, None);
+        let tuned = tuning_of(sharp(), goal, None);
         assert_eq!(tuned.settings[tuned.chosen.unwrap()].lightmap_reduction, 1, "{:?}", tuned.study.findings);
         assert!(error_of(&tuned, |settings| settings.lightmap_reduction == 2) > 0.3);
     }
     // 0.1 and 0.9 are off by more than 0.03 % as RGB9E5, so that within that half floats are taken.
-    let tuned = tuned(sharp(), Goal { milliseconds: None, error: Some(3e-4) }, None);
+    let tuned = tuning_of(sharp(), Goal { milliseconds: None, error: Some(3e-4) }, None);
     let chosen = tuned.settings[tuned.chosen.unwrap()];
     let maps = (chosen.lightmap_reduction, chosen.lightmap_format);
     assert_eq!(maps, (1, LightmapEncoding::Rgb16Float), "{:?}", tuned.study.findings);
