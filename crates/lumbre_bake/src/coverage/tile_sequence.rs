@@ -15,8 +15,8 @@ const TEXELS: u32 = SIDE * SIDE;
 #[derive(Clone, Copy)]
 pub(crate) struct TileSequence {
     sequence: Sequence,
-    /// Dimension sets 0 and 1, prepared once because every sample uses them.
-    prepared: [SequenceSet; 2],
+    /// Dimension set 0, prepared once because every sample uses it.
+    first_set: SequenceSet,
     /// The texel's position in its tile, in Morton order.
     morton_index: u32,
     /// Points in a texel's first section.
@@ -31,18 +31,12 @@ impl TileSequence {
         let tile = ((texel.y / SIDE) << 10) | (texel.x / SIDE);
         let sequence = Sequence::new(seed, stream, tile).of(texel.map.0);
         let morton_index = morton(texel.x % SIDE, texel.y % SIDE);
-        let prepared = [0, 1].map(|set| sequence.set(set));
-        Self { sequence, prepared, morton_index, first_section: first_section.max(1) }
+        Self { sequence, first_set: sequence.set(0), morton_index, first_section: first_section.max(1) }
     }
 
     /// The texel's point `sample` in dimension set 0.
     pub fn first(&self, sample: u32) -> [f32; 4] {
-        self.prepared[0].point(self.index(sample))
-    }
-
-    /// The same in dimension set 1.
-    pub fn second(&self, sample: u32) -> [f32; 4] {
-        self.prepared[1].point(self.index(sample))
+        self.first_set.point(self.index(sample))
     }
 
     /// The texel's point `sample` in dimension set `set`.

@@ -151,7 +151,7 @@ impl<'a> SharedLight<'a> {
             for sample in sums.samples..samples {
                 let [x, y, ..] = sequence.first(sample);
                 let Some(point) = texel.point(scene, x, y) else { continue };
-                let [choice, u, v, _] = sequence.second(sample);
+                let [choice, u, v, _] = sequence.point(sample, 1);
                 let light = self.sources.sample(shared, &receiver(scene, &point), [choice, u, v]);
                 *sum += light.baked;
                 sums.controls[replicate] += light.control;

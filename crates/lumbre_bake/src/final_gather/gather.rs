@@ -178,7 +178,7 @@ impl RadianceCache<'_> {
             let receiver = &samples.requests[slot].receiver;
             let last = self.read(receiver, hit, &sequences[replicate], sample, contribution);
             if let Some(last) = last.filter(|_| contribution.is_checked) {
-                let [u, v, ..] = sequences[replicate].second(sample);
+                let [u, v, ..] = sequences[replicate].point(sample, 1);
                 let region = self.guide.region_of(last.patch);
                 let request = GatherRequest { receiver: self.receiver_at(&last), region, u, v };
                 checks.push(request, (slot, last.patch));
