@@ -3,13 +3,14 @@
 //! measured peak.
 
 use std::mem::size_of;
+use std::sync::Arc;
 
 use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel};
 use crate::denoise::texel_rows::BESIDE_A_ROW;
 use crate::denoise::{Estimates, Nearness};
 use crate::error::mebibytes;
 use crate::final_gather::{GatherSums, TexelRadiance};
-use crate::radiosity::{Patch, PatchResolution, Patches};
+use crate::radiosity::{JoinableFaces, Patch, PatchResolution, Patches};
 use crate::report::StageNotes;
 use crate::scene::{LightmapLayout, SceneTriangle};
 use crate::sources::{Direct, Sources};
@@ -18,9 +19,9 @@ use crate::{BakeError, BakeOptions};
 /// Per triangle of the scene: the triangle itself; while the hierarchy is built, its corners without and with an index,
 /// and two nodes of the binary tree; in the finished hierarchy, its lane of a block that may be half empty, and its
 /// share of the nodes of eight (256 bytes each, at worst one per four triangles); in the tree of boxes, its number and
-/// at worst one node.
+/// at worst one node; its neighbours for face clusters, and its place in those of the patches and of the larger ones.
 const TRIANGLE_BYTES: u64 =
-    (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32) as u64;
+    (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32 + 12 + 2 * 16) as u64;
 
 /// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
 /// round, raw and smoothed estimates with their features, its nearness, nineteen lists of one number each for the
@@ -117,8 +118,14 @@ pub(crate) fn patch_resolution(
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let requested_rays = effort.form_factor_rays(texels.len(), options.error);
-    let mut resolution =
-        PatchResolution { patch_side: side, form_factor_rays: requested_rays, memory_bytes: 0 };
+    let joinable = Arc::new(JoinableFaces::new(scene, side));
+    let mut resolution = PatchResolution {
+        patch_side: side,
+        joinable: Arc::clone(&joinable),
+        texture_points: effort.texture_points,
+        form_factor_rays: requested_rays,
+        memory_bytes: 0,
+    };
     let covered = texels.len() as u64;
     let footprint_points = texels.iter().map(|texel| match &texel.footprint {
         Footprint::Points(points) => points.capacity() as u64,
@@ -128,7 +135,7 @@ pub(crate) fn patch_resolution(
         + footprint_points.sum::<u64>() * size_of::<FootprintPoint>() as u64
         + contacts.bytes()
         + map_bytes(layout, options);
-    let requested_patches = Patches::count(scene, side);
+    let requested_patches = Patches::count(scene, &joinable, side);
     let (mut patches, mut is_coarsest) = (requested_patches, false);
     loop {
         let needed = texel_bytes + scene_bytes(sources) + OTHER_BYTES + exchange_bytes(&resolution, patches);
@@ -144,7 +151,7 @@ pub(crate) fn patch_resolution(
         }
         resolution.patch_side *= std::f32::consts::SQRT_2;
         resolution.form_factor_rays /= 2;
-        let fewer = Patches::count(scene, resolution.patch_side);
+        let fewer = Patches::count(scene, &joinable, resolution.patch_side);
         is_coarsest = fewer == patches && resolution.form_factor_rays == 0;
         patches = fewer;
     }

@@ -27,7 +27,12 @@ const MIN_WALKS: u32 = 8;
 /// Walks from any block once the time is up.
 const LATE_WALKS: u32 = 4;
 /// The most steps of a walk.
-const BOUNCES: u32 = 6;
+const BOUNCES: u32 = 48;
+/// How many steps a walk takes to see something, however little light is left.
+const STEPS_TO_SEE: u32 = 6;
+/// A walk ends where surfaces have absorbed all but this share of what they reflect: after six bounces where they reflect
+/// half of the light.
+const LEAST_WEIGHT: f32 = 1.0 / 64.0;
 /// Blocks in view that a walk notes.
 const VIEW: usize = 2;
 /// The least distance of such a block from the point before, in texels.
@@ -188,6 +193,9 @@ impl Walker<'_> {
                     seen += 1;
                 }
                 walk.indirect += weight * channel_mean(self.direct[place.place()].total());
+            }
+            if weight < LEAST_WEIGHT && (seen == VIEW || bounce + 1 >= STEPS_TO_SEE) {
+                break;
             }
             at = Receiver::on_facet(scene, triangle, side, (u, v));
         }

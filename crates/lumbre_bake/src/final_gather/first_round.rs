@@ -61,7 +61,8 @@ pub(crate) fn cast_first_round(
     monitor.pass(BLOCKS_PROGRESS);
     if !cache.cast(list, &first, gathered, seed, monitor)? {
         // Single samples here and there would be dots among the light of patches.
-        from_patches(cache, list, gathered, |sums| sums.samples == 0 || sums.rays > 0);
+        let is_replaced = |sums: &GatherSums| sums.samples == 0 || sums.rays > 0;
+        from_patches(cache, texels, gathered, seed, is_replaced, monitor)?;
         return Ok(false);
     }
     let mut in_time = {
@@ -81,7 +82,7 @@ pub(crate) fn cast_first_round(
     }
     if !in_time {
         copy_representatives(&representatives, gathered);
-        from_patches(cache, list, gathered, knows_nothing);
+        from_patches(cache, texels, gathered, seed, knows_nothing, monitor)?;
     }
     Ok(in_time)
 }

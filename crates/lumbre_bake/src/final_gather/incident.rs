@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 
 use super::radiance_cache::RadianceCache;
 use crate::radiosity::{GuidedPatch, PatchIndex, RegionIndex, RowPart};
-use crate::sampling::{cosine_about, triangle_point};
+use crate::sampling::cosine_about;
 use crate::scene::{Receiver, Side, SurfaceHit};
 use crate::texel_index::MapTexel;
 
@@ -252,8 +252,8 @@ impl RadianceCache<'_> {
     fn point_of(&self, receiver: &Receiver, guided: GuidedPatch, v: f32) -> Option<SampleTarget> {
         let GuidedPatch { patch, u, density } = guided;
         let chosen = &self.exchange.patches.list[patch.place()];
-        let (triangle, side) = (chosen.triangle, chosen.side);
-        let at = self.exchange.patches.point(chosen, triangle_point(u, v));
+        let (triangle, at) = self.exchange.patches.point(chosen, [u, v]);
+        let side = chosen.side;
         let surface = &self.scene.triangles[triangle as usize];
         let position = surface.position(at.0, at.1);
         let offset = position - receiver.position;

@@ -5,14 +5,20 @@ use glam::{Vec2, Vec3};
 
 use super::gather_sums::GatherSums;
 use super::radiance_cache::RadianceCache;
+use crate::BakeError;
+use crate::chunks::in_chunks;
 use crate::color::wide_channel_mean;
-use crate::coverage::Texel;
+use crate::coverage::{CoveredTexels, Texel};
 use crate::denoise::REPLICATES;
 use crate::denoise::replicates::{mean, variance};
+use crate::monitor::BakeMonitor;
 use crate::scene::Side;
 
-/// Fewer gathered texels than this say nothing about the others.
-const MIN_GATHERED: u32 = 256;
+/// How many texels are compared with their patches, and the samples of each replicate that they gather for it.
+const PROBED: usize = 2048;
+const PROBE_SAMPLES: u32 = 2;
+/// Fewer texels than this say nothing about the others.
+const MIN_GATHERED: usize = 256;
 
 /// Where no more samples per replicate than this found only darkness, the patch says more than they do.
 const FEW_SAMPLES: u32 = 3;
@@ -22,42 +28,21 @@ pub(crate) fn knows_nothing(sums: &GatherSums) -> bool {
     sums.samples <= FEW_SAMPLES && sums.sums.iter().all(|sum| *sum == Vec3::ZERO)
 }
 
-/// Gives the irradiance of its patch to every open texel for whose sums `is_replaced` holds.
-/// The error stated for it is, relative to the light, the RMS difference between patches and texels where texels did
-/// gather, plus one standard error of that; where too few did, it is all of the light.
+/// Gives the irradiance of its patch to every open texel for whose sums `is_replaced` holds. The error stated for it is,
+/// relative to the light, that of [`error_of_patches`].
 pub(crate) fn from_patches(
     cache: &RadianceCache<'_>,
-    texels: &[Texel],
+    texels: &CoveredTexels<'_>,
     gathered: &mut [GatherSums],
+    seed: u32,
     is_replaced: impl Fn(&GatherSums) -> bool,
-) {
-    let patch_light = |texel: &Texel| -> Vec3 {
-        let Some(point) = texel.point(cache.scene, 0.5, 0.5) else { return Vec3::ZERO };
-        let patch = cache.exchange.patches.at(point.triangle, Side::Front, point.at);
-        patch.map_or(Vec3::ZERO, |patch| cache.exchange.indirect[patch.place()])
-    };
-    let (mut squared_differences, mut scatter, mut squared_light, mut count) = (0.0f64, 0.0f64, 0.0, 0u32);
-    for (texel, sums) in texels.iter().zip(&*gathered).filter(|(_, sums)| sums.rays > 0) {
-        let estimates = sums.estimates();
-        let mean = wide_channel_mean(mean(&estimates));
-        // The part of the difference that is the texel's own noise is not the patch's error.
-        let noise = f64::from(variance(&estimates).element_sum()) / 3.0;
-        let squared_difference = (mean - wide_channel_mean(patch_light(texel))).powi(2) - noise;
-        squared_differences += squared_difference;
-        scatter += squared_difference * squared_difference;
-        squared_light += mean.powi(2) - noise;
-        count += 1;
-    }
-    let relative_error = if count >= MIN_GATHERED && squared_light > 0.0 {
-        // The noise of few rays may exceed the difference, which is then known only to within its standard error.
-        ((squared_differences.max(0.0) + scatter.sqrt()) / squared_light).sqrt().min(1.0)
-    } else {
-        1.0
-    };
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<(), BakeError> {
+    let relative_error = error_of_patches(cache, texels, seed, monitor)?;
     for (texel, sums) in
-        texels.iter().zip(gathered).filter(|(texel, sums)| is_replaced(sums) && !texel.is_hidden())
+        texels.list.iter().zip(gathered).filter(|(texel, sums)| is_replaced(sums) && !texel.is_hidden())
     {
-        let light = patch_light(texel);
+        let light = patch_light(cache, texel);
         *sums = GatherSums {
             sums: [light; REPLICATES],
             samples: 1,
@@ -66,4 +51,47 @@ pub(crate) fn from_patches(
             ..GatherSums::default()
         };
     }
+    Ok(())
+}
+
+/// The irradiance of the patch that a texel lies on.
+fn patch_light(cache: &RadianceCache<'_>, texel: &Texel) -> Vec3 {
+    let Some(point) = texel.point(cache.scene, 0.5, 0.5) else { return Vec3::ZERO };
+    let patch = cache.exchange.patches.at(point.triangle, Side::Front, point.at);
+    patch.map_or(Vec3::ZERO, |patch| cache.exchange.indirect[patch.place()])
+}
+
+/// The RMS difference between patches and texels, plus one standard error of that, relative to the light: found by
+/// gathering at a few texels all over the level, though the time is up. Where there are too few texels, it is all of the
+/// light.
+fn error_of_patches(
+    cache: &RadianceCache<'_>,
+    texels: &CoveredTexels<'_>,
+    seed: u32,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<f64, BakeError> {
+    let open: Vec<&Texel> = texels.open().map(|(_, texel)| texel).collect();
+    if open.len() < MIN_GATHERED {
+        return Ok(1.0);
+    }
+    let probed: Vec<&Texel> = open.iter().copied().step_by(open.len().div_ceil(PROBED)).collect();
+    let gathered: Vec<GatherSums> = in_chunks(probed.len(), monitor, |place| {
+        let mut sums = GatherSums::default();
+        cache.gather(probed[place], &mut sums, PROBE_SAMPLES, seed);
+        sums
+    })?;
+    let (mut squared_differences, mut scatter, mut squared_light) = (0.0f64, 0.0f64, 0.0);
+    for (texel, sums) in probed.iter().zip(&gathered) {
+        let estimates = sums.estimates();
+        let mean = wide_channel_mean(mean(&estimates));
+        // The part of the difference that is the texel's own noise is not the patch's error.
+        let noise = f64::from(variance(&estimates).element_sum()) / 3.0;
+        let squared_difference = (mean - wide_channel_mean(patch_light(cache, texel))).powi(2) - noise;
+        squared_differences += squared_difference;
+        scatter += squared_difference * squared_difference;
+        squared_light += mean.powi(2) - noise;
+    }
+    // The noise of few rays may exceed the difference, which is then known only to within its standard error.
+    let squared = (squared_differences.max(0.0) + scatter.sqrt()) / squared_light;
+    Ok(if squared_light > 0.0 { squared.sqrt().min(1.0) } else { 1.0 })
 }

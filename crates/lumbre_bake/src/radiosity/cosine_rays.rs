@@ -7,7 +7,7 @@ use super::ray_counts::{PatchRayCounts, counted};
 use crate::BakeError;
 use crate::chunks::in_chunks;
 use crate::monitor::BakeMonitor;
-use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
+use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::{BakeScene, SurfaceHit};
 
 /// Fewest and most rays per patch. The sequence has 65,536 points.
@@ -52,21 +52,19 @@ pub(crate) fn cast_from_patch(
     seed: u32,
 ) -> PatchRayCounts {
     let patch = &patches.list[index.place()];
-    let triangle = &scene.triangles[patch.triangle as usize];
-    let normal = triangle.side_normal(patch.side);
-    let [p, q, r] = patches.corners(scene, patch);
     let sequence = Sequence::new(seed, Stream::FormFactors, index.0);
     let mut hits = [Vec::with_capacity(count as usize / 2 + 1), Vec::with_capacity(count as usize / 2)];
     let (mut inside, mut missed) = ([0; 2], [0; 2]);
     for ray in 0..count {
         let half = ray as usize % 2;
         let [a, b, c, d] = sequence.point(ray, 0);
-        let (u, v) = triangle_point(a, b);
-        let position = p + (q - p) * u + (r - p) * v;
-        let origin = scene.off_surface(patch.triangle, patch.side, position);
-        match scene.first_hit(origin, cosine_about(normal, c, d)) {
+        let (face, (u, v)) = patches.point(patch, [a, b]);
+        let triangle = &scene.triangles[face as usize];
+        let origin = scene.off_surface(face, patch.side, triangle.position(u, v));
+        match scene.first_hit(origin, cosine_about(triangle.side_normal(patch.side), c, d)) {
             SurfaceHit::Lit { triangle, side, at, .. } => {
-                hits[half].extend(patches.at(triangle, side, at).filter(|&other| other != index));
+                let is_other = |&hit: &PatchIndex| hit != index || patches.sees_itself(index);
+                hits[half].extend(patches.at(triangle, side, at).filter(is_other));
             }
             SurfaceHit::Inside => inside[half] += 1,
             SurfaceHit::None => missed[half] += 1,

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use lumbre_mesh::TriangleMesh;
 
+use super::face_clusters::JoinableFaces;
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
@@ -43,12 +44,17 @@ pub(crate) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
     laid_out(&objects, space, &options).1
 }
 
+/// The patches of a scene, of about `side` canonical units.
+pub(crate) fn patches_of(scene: &BakeScene, side: f32) -> Patches {
+    Patches::new(scene, &Arc::new(JoinableFaces::new(scene, side)), side, 64)
+}
+
 const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines];
 
 /// The form factor from the first object to the second, and the number of rays from the first that it was counted from.
 fn factor(objects: &[&[[Vec3; 3]]], side: f32, method: FormFactorMethod) -> (f64, f64) {
     let scene = scene(objects);
-    let patches = Patches::new(&scene, side * scene.space.scale as f32);
+    let patches = patches_of(&scene, side * scene.space.scale as f32);
     let mut carry_on = carry_on;
     let monitor = &mut BakeMonitor::new(&mut carry_on, None);
     let (factors, _) = FormFactors::sample(&scene, &patches, method, 200_000, 7, monitor).unwrap();
@@ -136,7 +142,7 @@ fn room() -> Vec<[Vec3; 3]> {
 fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
     for method in METHODS {
         let scene = scene(&[&room()]);
-        let patches = Patches::new(&scene, 0.25 * scene.space.scale as f32);
+        let patches = patches_of(&scene, 0.25 * scene.space.scale as f32);
         let mut carry_on = carry_on;
         let monitor = &mut BakeMonitor::new(&mut carry_on, None);
         let (factors, _) = FormFactors::sample(&scene, &patches, method, 100_000, 3, monitor).unwrap();

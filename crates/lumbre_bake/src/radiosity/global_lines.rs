@@ -64,7 +64,7 @@ pub(crate) fn cast(
     let segments =
         in_chunks_until_deadline(batches, monitor, |batch| lines.segments(scene, patches, batch as u32))?;
     let lines = segments.len() as u64 * u64::from(BATCH);
-    let mut counts = counts_of(&segments, patches.list.len());
+    let mut counts = counts_of(&segments, patches);
     let is_crossed_seldom = |index: &PatchIndex| counts[index.place()].count.iter().sum::<u32>() < MIN_RAYS;
     let seldom: Vec<PatchIndex> = PatchIndex::all(counts.len()).filter(is_crossed_seldom).collect();
     let rays = in_chunks(seldom.len(), monitor, |place| {
@@ -143,10 +143,11 @@ const LINE_COST: f64 = 1.0;
 const CROSSING_COST: f64 = 0.5;
 
 /// The counts per patch, from the segments of all batches: a segment is a ray from each of its ends.
-fn counts_of(batches: &[Vec<(LineEnd, LineEnd)>], patches: usize) -> Vec<PatchRayCounts> {
-    let mut counts = vec![PatchRayCounts::default(); patches];
+fn counts_of(batches: &[Vec<(LineEnd, LineEnd)>], patches: &Patches) -> Vec<PatchRayCounts> {
+    let count = patches.list.len();
+    let mut counts = vec![PatchRayCounts::default(); count];
     for half in 0..2 {
-        let mut hits: Vec<Vec<PatchIndex>> = vec![Vec::new(); patches];
+        let mut hits: Vec<Vec<PatchIndex>> = vec![Vec::new(); count];
         for &(a, b) in batches.iter().skip(half).step_by(2).flatten() {
             for (from, to) in [(a, b), (b, a)] {
                 let Some(from) = from.patch() else { continue };
@@ -156,7 +157,10 @@ fn counts_of(batches: &[Vec<(LineEnd, LineEnd)>], patches: usize) -> Vec<PatchRa
                     LineEnd::NOTHING => counts.missed[half] += 1,
                     LineEnd::INSIDE => counts.inside[half] += 1,
                     // A flat patch cannot see itself; rounding at its edges may say so.
-                    _ => hits[from.place()].extend(to.patch().filter(|&patch| patch != from)),
+                    _ => {
+                        let may_see = |&to: &PatchIndex| to != from || patches.sees_itself(from);
+                        hits[from.place()].extend(to.patch().filter(may_see));
+                    }
                 }
             }
         }

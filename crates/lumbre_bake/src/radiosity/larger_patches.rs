@@ -20,15 +20,13 @@ pub(crate) struct LargerPatches {
 impl LargerPatches {
     /// Patches of about `side` canonical units; `None` if the bake was cancelled.
     pub fn new(scene: &BakeScene, smaller: &Patches, side: f32) -> Option<Self> {
-        let patches = Patches::outlines(scene, side);
+        let patches = Patches::outlines(scene, &smaller.joinable, side);
         if scene.stop.is_cancelled() {
             return None;
         }
         let containing = |patch| {
-            let centroid = smaller.point(patch, (1.0 / 3.0, 1.0 / 3.0));
-            patches
-                .at(patch.triangle, patch.side, centroid)
-                .map_or(RegionIndex(0), |larger| RegionIndex(larger.0))
+            let (triangle, centroid) = smaller.middle(patch);
+            patches.at(triangle, patch.side, centroid).map_or(RegionIndex(0), |larger| RegionIndex(larger.0))
         };
         let of: Vec<RegionIndex> = smaller.list.iter().map(containing).collect();
         let mut members = vec![Vec::new(); patches.list.len()];

@@ -10,6 +10,7 @@ use glam::Vec3;
 
 use super::exchange::mean_reflectances;
 use super::exchange_tests::{MODELS, model};
+use super::form_factor_tests::patches_of;
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patch_light::patch_direct;
@@ -54,7 +55,7 @@ fn form_factor_errors(
     let (_, scene) = laid_out(&input.objects, input.space(), options);
     let sources = Sources::new(&scene, emitters(&scene), input.lights, input.sky);
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
-    let patches = Patches::new(&scene, (2.0 * area / options.effort().patches as f32).sqrt());
+    let patches = patches_of(&scene, (2.0 * area / options.effort().patches as f32).sqrt());
     let mut carry_on = |_| ControlFlow::Continue(());
     let mut monitor = BakeMonitor::new(&mut carry_on, None);
     let mut sample = |method, rays, seed| {

@@ -7,6 +7,7 @@ pub(crate) mod cosine_rays;
 pub(crate) mod exchange;
 #[cfg(test)]
 mod exchange_tests;
+pub(crate) mod face_clusters;
 #[cfg(test)]
 mod form_factor_tests;
 pub(crate) mod form_factors;
@@ -31,6 +32,7 @@ mod triangle_cells;
 mod unseen_regions;
 
 pub(crate) use exchange::{Exchange, ExchangeReport};
+pub(crate) use face_clusters::JoinableFaces;
 pub(crate) use form_factors::FormFactors;
 pub(crate) use patch_index::{PatchIndex, RegionIndex};
 pub(crate) use patches::{Patch, Patches};

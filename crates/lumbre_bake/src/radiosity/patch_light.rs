@@ -9,7 +9,7 @@ use crate::chunks::in_chunks;
 use crate::coverage::{CoveredTexels, Footprint, Texel, barycentric};
 use crate::direct_light::DirectLight;
 use crate::monitor::BakeMonitor;
-use crate::sampling::{Sequence, Stream, triangle_point};
+use crate::sampling::{Sequence, Stream};
 use crate::scene::{BakeScene, Receiver, Side};
 use crate::sources::Sources;
 use crate::{BakeError, BakeOptions, Quality};
@@ -128,12 +128,12 @@ pub(crate) fn patch_direct(
     if open <= 0.0 || patch.reflectance == Vec3::ZERO {
         return (Vec3::ZERO, 0);
     }
-    let triangle = &scene.triangles[patch.triangle as usize];
     let point = |x: f32, y: f32| {
-        let (u, v) = patches.point(patch, triangle_point(x, y));
+        let (face, (u, v)) = patches.point(patch, [x, y]);
+        let triangle = &scene.triangles[face as usize];
         let normal = triangle.side_normal(patch.side);
         let position = triangle.position(u, v);
-        let origin = scene.off_surface(patch.triangle, patch.side, position);
+        let origin = scene.off_surface(face, patch.side, position);
         let shading = triangle.shading_normal(u, v);
         let shading = if patch.side == Side::Front { shading } else { -shading };
         Some(Receiver { position, origin, geometric_normal: normal, normal: shading })
@@ -155,7 +155,8 @@ mod tests {
     use crate::coverage::{FootprintPoint, receiver};
     use crate::direct_light::direct_light;
     use crate::monitor::BakeMonitor;
-    use crate::sampling::{Sequence, Stream, triangle_point};
+    use crate::radiosity::form_factor_tests::patches_of;
+    use crate::sampling::{Sequence, Stream};
     use crate::scene::laid_out::laid_out;
     use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
     use crate::sources::Sources;
@@ -185,14 +186,14 @@ mod tests {
         let mut monitor = BakeMonitor::new(&mut carry_on, None);
         let (texels, _) = CoveredTexels::new(&scene, &layout, &mut monitor).unwrap();
         let (direct, _) = direct_light(&sources, &texels, &[], &options, &mut monitor).unwrap();
-        let patches = Patches::new(&scene, 6.0 * texels.side);
+        let patches = patches_of(&scene, 6.0 * texels.side);
         let light = patch_light(&texels, &direct, &patches);
 
         let (mut known, mut squares, mut sum) = (0.0, 0.0, 0.0);
         for (index, (patch, light)) in patches.list.iter().zip(&light).enumerate() {
             let Some(halves) = light else { continue };
             let point = |x: f32, y: f32| {
-                let (triangle, at) = (patch.triangle, patches.point(patch, triangle_point(x, y)));
+                let (triangle, at) = patches.point(patch, [x, y]);
                 Some(receiver(&scene, &FootprintPoint { triangle, at, offset: Vec2::ZERO }))
             };
             let sequence = Sequence::new(1, Stream::Test(92), index as u32);

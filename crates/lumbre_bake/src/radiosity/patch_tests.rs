@@ -7,7 +7,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::Material;
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 
-use super::form_factor_tests::{scene, square};
+use super::form_factor_tests::{patches_of, scene, square};
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::sampling::{Sequence, Stream, triangle_point};
@@ -18,8 +18,8 @@ use crate::scene::{BakeScene, Side};
 /// sides.
 fn check(objects: &[&[[Vec3; 3]]], side: f32, side_of_line: impl Fn(Vec3) -> u32) {
     let scene = scene(objects);
-    let patches = Patches::new(&scene, side);
-    assert_eq!(patches.list.len() as u64, Patches::count(&scene, side));
+    let patches = patches_of(&scene, side);
+    assert_eq!(patches.list.len() as u64, Patches::count(&scene, &patches.joinable, side));
     let area: f32 = patches.list.iter().map(|patch| patch.area).sum();
     let expected: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     assert!((area / expected - 1.0).abs() < 1e-5, "{area} {expected}");
@@ -34,7 +34,7 @@ fn check(objects: &[&[[Vec3; 3]]], side: f32, side_of_line: impl Fn(Vec3) -> u32
             // Away from the patch's edges, where the result depends on rounding.
             let (u, v) = triangle_point(x, y);
             let (u, v) = (0.02 + 0.94 * u, 0.02 + 0.94 * v);
-            let at = patches.point(patch, (u, v));
+            let at = patches.point_in_triangle(patch, (u, v));
             assert_eq!(patches.at(patch.triangle, patch.side, at), Some(index), "{patch:?} {at:?}");
             sides.push(side_of_line(scene.triangles[patch.triangle as usize].position(at.0, at.1)));
         }
@@ -93,13 +93,13 @@ fn a_patch_reflects_the_mean_of_its_texels() {
     let checker = |x: u32, y: u32| (x + y).is_multiple_of(2);
     let check = |is_white: &dyn Fn(u32, u32) -> bool, side: f32| {
         let scene = textured(is_white);
-        let patches = Patches::new(&scene, side * scene.space.scale as f32);
+        let patches = patches_of(&scene, side * scene.space.scale as f32);
         let white = (0..64 * 64).filter(|at| is_white(at % 64, at / 64)).count() as f64 / (64.0 * 64.0);
         let mean = patches.mean_reflectance();
         assert!((mean / (0.8 * white) - 1.0).abs() < 0.02, "{} patches: {mean} {white}", patches.list.len());
         patches
     };
-    for side in [9.0, 0.5, 0.1] {
+    for side in [2.0, 0.5, 0.1] {
         for is_white in [&spots as &dyn Fn(u32, u32) -> bool, &stripes, &checker] {
             let patches = check(is_white, side);
             assert!(patches.warnings.is_empty(), "{:?}", patches.warnings);
@@ -115,7 +115,7 @@ fn a_patch_that_shows_too_many_texels_is_named() {
         let mut scene = textured(|x, _| x.is_multiple_of(8));
         let textures = scene.surfaces[0].textures.as_mut().expect("a textured surface");
         textures.base_color.as_mut().expect("a base colour").scale = Vec2::splat(scale);
-        let patches = Patches::new(&scene, 9.0 * scene.space.scale as f32);
+        let patches = patches_of(&scene, 2.0 * scene.space.scale as f32);
         let warns = patches.warnings.iter().any(|warning| warning.contains("texels of its textures"));
         assert_eq!(warns, expected, "{:?}", patches.warnings);
     }
@@ -125,7 +125,7 @@ fn a_patch_that_shows_too_many_texels_is_named() {
 fn two_textures_that_vary_together_are_averaged_as_their_product() {
     // Metal exactly where the base colour is white: no point reflects diffusely, though the product of the means is 0.2.
     let is_white = |x: u32, y: u32| (x / 16 + y / 16).is_multiple_of(2);
-    for side in [9.0, 0.5] {
+    for side in [2.0, 0.5] {
         let mut scene = textured(is_white);
         let textures = scene.surfaces[0].textures.as_mut().expect("a textured surface");
         let texture = textures.base_color.clone().expect("a base colour");
@@ -137,7 +137,7 @@ fn two_textures_that_vary_together_are_averaged_as_their_product() {
             roughness: 1.0,
             dielectric: Vec3::splat(0.04),
         });
-        let patches = Patches::new(&scene, side * scene.space.scale as f32);
+        let patches = patches_of(&scene, side * scene.space.scale as f32);
         let mean = patches.mean_reflectance();
         // Where the two meet, bilinear filtering leaves a line of partly metallic texels.
         assert!(mean < 0.04, "{} patches: {mean}", patches.list.len());

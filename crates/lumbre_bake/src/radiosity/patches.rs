@@ -1,27 +1,32 @@
-//! Patches: the pieces of surface over which radiosity is constant. They are the cells of triangles, or pieces of cut
-//! cells: `triangle_cells` divides the triangles. The light of patches is computed in `form_factors` and `solver`.
+//! Patches: the pieces of surface over which radiosity is constant. They are the cells of triangles, pieces of cut cells,
+//! or clusters of small triangles: `triangle_cells` divides the large ones, `face_clusters` puts the small ones together.
+//! The light of patches is computed in `form_factors` and `solver`.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::bsp::BspTrees;
+use super::face_clusters::{FaceClusters, JoinableFaces};
 use super::patch_index::PatchIndex;
-use super::triangle_cells::{CORNERS, TriangleCells, cell_at, point_in_row, row_of_cell};
+use super::triangle_cells::{CORNERS, TriangleCells, cell_area, cell_at, point_in_row, row_of_cell};
+use crate::sampling::triangle_point;
 use crate::scene::mean_of_points::{SubTriangle, mean_of_points};
 use crate::scene::{BakeScene, SceneTriangle, ShownTexels, Side};
 use crate::texel_index::MapIndex;
 
-/// One side of one piece of a triangle.
+/// One side of one piece of a triangle, or of a cluster of triangles.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patch {
+    /// The triangle, or the first one of the cluster.
     pub triangle: u32,
     pub side: Side,
-    /// Which piece of the triangle this is: a whole cell as [`packed`] stores it or, with [`PIECE_FLAG`] set, the index
-    /// of a piece of a cut cell.
+    /// Which piece of the triangle this is: a whole cell as [`packed`] stores it; with [`PIECE_FLAG`] set, the index of a
+    /// piece of a cut cell; or, with [`CLUSTER_FLAG`] set, the number of a cluster.
     cell: u32,
     /// Square canonical units.
     pub area: f32,
@@ -60,6 +65,8 @@ const MIN_PIECE_SHARE: f32 = 1e-6;
 const UNCUT: u32 = u32::MAX;
 /// Marks the number of a piece of a cut cell, as opposed to that of a whole cell.
 const PIECE_FLAG: u32 = 1 << 31;
+/// Marks the number of a cluster. Rows of cells end below it.
+const CLUSTER_FLAG: u32 = 1 << 30;
 /// Bit of [`Patch::cell`] at which the row begins. The row and the place in it are both below 2^11, as a triangle has
 /// at most 1024 divisions.
 const ROW_SHIFT: u32 = 16;
@@ -72,12 +79,25 @@ pub(crate) struct Patches {
     /// For each cell of each triangle with cut cells: the root of the cell's tree, or [`UNCUT`].
     roots: Vec<u32>,
     trees: BspTrees,
+    clusters: FaceClusters,
+    /// The triangles that may share a patch.
+    pub joinable: Arc<JoinableFaces>,
     /// Where patches are coarser than they should be, for the report.
     pub warnings: Vec<String>,
 }
 
-/// Most points along a patch's edge at which textures are averaged.
-const MAX_TEXTURE_POINTS: u32 = 64;
+/// Pieces of surface that are smaller than this share of a cell have fewer points, in proportion to their area. Their
+/// means are less exact, but they reflect less, and the mean over all that a cell would hold is as exact as a cell's.
+const FEWER_POINTS_BELOW: f32 = 0.25;
+
+/// Most points along the edge of a piece of surface whose area is this share of a cell's, which may have `of_cell`.
+fn most_texture_points(of_cell: u32, share: f32) -> u32 {
+    let share = (share / FEWER_POINTS_BELOW).min(1.0);
+    ((of_cell as f32 * share.sqrt()).ceil() as u32).max(2)
+}
+/// A texture that would take more points than this along a patch's edge is named in a warning, if the bake is to be exact
+/// or not.
+const NAMED_ABOVE: f32 = 64.0;
 /// Texels along a patch's edge up to which each of them has a point.
 const FEW_TEXELS: f32 = 16.0;
 
@@ -92,38 +112,54 @@ impl Patches {
     }
 
     /// How many patches [`Patches::new`] would make, without the memory that they take.
-    pub fn count(scene: &BakeScene, side: f32) -> u64 {
+    pub fn count(scene: &BakeScene, joinable: &JoinableFaces, side: f32) -> u64 {
         let mut trees = BspTrees::default();
-        let lit = scene.triangles.iter().enumerate().filter(|(_, triangle)| !triangle.is_hidden_duplicate);
-        let lit = lit.take_while(|_| !scene.stop.is_cancelled());
-        lit.map(|(index, triangle)| {
-            let cells = TriangleCells::new(scene, index, side, &mut trees);
-            cells.patches_per_side() * (1 + u64::from(triangle.two_sided))
-        })
-        .sum()
+        let clusters = FaceClusters::new(scene, joinable, side);
+        let sides = |index: usize| 1 + u64::from(scene.triangles[index].two_sided);
+        let of_clusters: u64 =
+            (0..clusters.len()).map(|cluster| sides(clusters.faces(cluster)[0] as usize)).sum();
+        let is_alone = |&index: &usize| {
+            !scene.triangles[index].is_hidden_duplicate && clusters.of(index as u32).is_none()
+        };
+        let alone = (0..scene.triangles.len()).filter(is_alone).take_while(|_| !scene.stop.is_cancelled());
+        let of_triangle = |index: usize| {
+            TriangleCells::new(scene, index, side, &mut trees).patches_per_side() * sides(index)
+        };
+        of_clusters + alone.map(of_triangle).sum::<u64>()
     }
 
-    /// Divides every triangle into patches of about `side` canonical units.
-    pub fn new(scene: &BakeScene, side: f32) -> Self {
-        let mut patches = Self::outlines(scene, side);
-        patches.find_reflectances(scene);
+    /// Divides all surfaces into patches of about `side` canonical units. Those of `joinable` triangles may be clusters.
+    /// Textures are averaged from up to `texture_points` along the edge of a patch.
+    pub fn new(scene: &BakeScene, joinable: &Arc<JoinableFaces>, side: f32, texture_points: u32) -> Self {
+        let mut patches = Self::outlines(scene, joinable, side);
+        patches.find_reflectances(scene, side, texture_points);
         patches
     }
 
     /// As [`Patches::new`], but without reflectances: all of them are 0.
-    pub fn outlines(scene: &BakeScene, side: f32) -> Self {
+    pub fn outlines(scene: &BakeScene, joinable: &Arc<JoinableFaces>, side: f32) -> Self {
         let mut patches = Self {
             list: Vec::new(),
             triangles: Vec::with_capacity(scene.triangles.len()),
             roots: Vec::new(),
             trees: BspTrees::default(),
+            clusters: FaceClusters::new(scene, joinable, side),
+            joinable: Arc::clone(joinable),
             warnings: Vec::new(),
         };
+        // Per cluster, its patches, once its first triangle has been visited.
+        let mut of_clusters = vec![None; patches.clusters.len() as usize];
         // Per object, how many of its cells more lines cross than may cut them.
         let mut full_cells: BTreeMap<MapIndex, usize> = BTreeMap::new();
         for (index, triangle) in scene.triangles.iter().enumerate() {
             if triangle.is_hidden_duplicate || scene.stop.is_cancelled() {
                 patches.triangles.push(TrianglePatches::NONE);
+                continue;
+            }
+            if let Some(cluster) = patches.clusters.of(index as u32) {
+                let of_cluster = &mut of_clusters[cluster as usize];
+                let of_cluster = *of_cluster.get_or_insert_with(|| patches.push_cluster(scene, cluster));
+                patches.triangles.push(of_cluster);
                 continue;
             }
             let full_before = patches.trees.full;
@@ -142,6 +178,22 @@ impl Patches {
         };
         patches.warnings = full_cells.into_iter().map(warning).collect();
         patches
+    }
+
+    /// Appends the patches of a cluster, one per side.
+    fn push_cluster(&mut self, scene: &BakeScene, cluster: u32) -> TrianglePatches {
+        let faces = self.clusters.faces(cluster);
+        let triangle = &scene.triangles[faces[0] as usize];
+        let area = faces.iter().map(|&face| scene.triangles[face as usize].area).sum();
+        let (cell, reflectance) = (CLUSTER_FLAG | cluster, Vec3::ZERO);
+        let mut push = |side| {
+            self.list.push(Patch { triangle: faces[0], side, cell, area, reflectance });
+            PatchIndex::new(self.list.len() - 1)
+        };
+        let (front, back) = (push(Side::Front), triangle.two_sided.then(|| push(Side::Back)));
+        let varies = scene.surfaces[triangle.surface as usize].varies();
+        let reflectance = (!varies).then_some([Vec3::ZERO; 2]);
+        TrianglePatches { divisions: 1, front, back, reflectance, roots: UNCUT }
     }
 
     /// Appends the patches of a triangle.
@@ -204,13 +256,24 @@ impl Patches {
     }
 
     /// Finds what each patch reflects, and warns of textures that are too fine for the patches.
-    fn find_reflectances(&mut self, scene: &BakeScene) {
+    fn find_reflectances(&mut self, scene: &BakeScene, side: f32, texture_points: u32) {
         let of_patch = |patch: &Patch| {
-            if scene.stop.is_cancelled() {
-                return (Vec3::ZERO, None);
+            let (mut sum, mut area, mut most_texels) = (Vec3::ZERO, 0.0, None::<f32>);
+            for (triangle, corners) in self.pieces(patch) {
+                if scene.stop.is_cancelled() {
+                    break;
+                }
+                let area_of_piece = area_share(&corners) * scene.triangles[triangle as usize].area;
+                let most_points = most_texture_points(texture_points, area_of_piece / cell_area(side));
+                let piece = (triangle as usize, patch.side, corners);
+                let (reflectance, texels) = mean_reflectance(scene, piece, most_points);
+                sum += reflectance * area_of_piece;
+                area += area_of_piece;
+                if points_for(texels) > NAMED_ABOVE {
+                    most_texels = Some(most_texels.map_or(texels.edge, |most| most.max(texels.edge)));
+                }
             }
-            let corners = CORNERS.map(|at| self.point(patch, at));
-            reflectance_and_texels(scene, patch.triangle as usize, patch.side, &corners)
+            (if area > 0.0 { sum / area } else { Vec3::ZERO }, most_texels)
         };
         let results: Vec<(Vec3, Option<f32>)> = self.list.par_iter().map(of_patch).collect();
         // Per object with a patch that shows too many texels, the most texels along a patch's edge.
@@ -232,7 +295,7 @@ impl Patches {
         self.warnings.extend(most_texels.into_iter().map(|(map, most)| {
             format!(
                 "{}: a patch of it shows up to {most:.0} texels of its textures along an edge; what bounces off it is the mean of \
-                 {MAX_TEXTURE_POINTS} points along there, which may miss what is smaller",
+                 {texture_points} points along there, which may miss what is smaller",
                 scene.names[map.place()]
             )
         }));
@@ -263,8 +326,38 @@ impl Patches {
         self.triangles[triangle as usize].reflectance.map(|sides| sides[usize::from(side == Side::Back)])
     }
 
-    /// Converts barycentric weights in a patch to those in its triangle, both of the second and third vertex.
-    pub fn point(&self, patch: &Patch, (u, v): (f32, f32)) -> (f32, f32) {
+    /// A point of a patch for (x, y) in [0, 1)², uniformly distributed over its area: the triangle, and the barycentric
+    /// weights of its second and third vertex.
+    pub fn point(&self, patch: &Patch, [x, y]: [f32; 2]) -> (u32, (f32, f32)) {
+        match self.cluster(patch) {
+            Some(cluster) => {
+                let (face, x) = self.clusters.pick(cluster, x);
+                (face, triangle_point(x, y))
+            }
+            None => (patch.triangle, self.point_in_triangle(patch, triangle_point(x, y))),
+        }
+    }
+
+    /// The centroid of a patch, or of the first triangle of its cluster, as [`Patches::point`] returns points.
+    pub fn middle(&self, patch: &Patch) -> (u32, (f32, f32)) {
+        let centroid = (1.0 / 3.0, 1.0 / 3.0);
+        let is_cluster = self.cluster(patch).is_some();
+        (patch.triangle, if is_cluster { centroid } else { self.point_in_triangle(patch, centroid) })
+    }
+
+    /// Whether light may pass directly from one point of a patch to another, as it is not flat.
+    pub fn sees_itself(&self, index: PatchIndex) -> bool {
+        self.cluster(&self.list[index.place()]).is_some()
+    }
+
+    /// The number of a patch's cluster; `None` for a piece of a triangle.
+    fn cluster(&self, patch: &Patch) -> Option<u32> {
+        (patch.cell & PIECE_FLAG == 0 && patch.cell & CLUSTER_FLAG != 0).then_some(patch.cell & !CLUSTER_FLAG)
+    }
+
+    /// Converts barycentric weights in a patch, which is no cluster, to those in its triangle, both of the second and
+    /// third vertex.
+    pub(super) fn point_in_triangle(&self, patch: &Patch, (u, v): (f32, f32)) -> (f32, f32) {
         if patch.cell & PIECE_FLAG == 0 {
             let divisions = self.triangles[patch.triangle as usize].divisions.max(1);
             let (row, place) = (patch.cell >> ROW_SHIFT, patch.cell & ((1 << ROW_SHIFT) - 1));
@@ -272,28 +365,41 @@ impl Patches {
         }
         point_between(&self.trees.pieces[(patch.cell & !PIECE_FLAG) as usize], u, v)
     }
-}
 
-impl Patches {
+    /// The triangles that a patch consists of: whole ones, or a part of one.
+    fn pieces(&self, patch: &Patch) -> impl Iterator<Item = (u32, SubTriangle)> {
+        let faces = self.cluster(patch).map_or(&[][..], |cluster| self.clusters.faces(cluster));
+        let part = faces.is_empty().then(|| CORNERS.map(|at| self.point_in_triangle(patch, at)));
+        let triangle = patch.triangle;
+        faces.iter().map(|&face| (face, CORNERS)).chain(part.map(|corners| (triangle, corners)))
+    }
+
+    /// The corners of each triangle that a patch consists of, canonical units.
+    pub fn facets(&self, scene: &BakeScene, patch: &Patch) -> impl Iterator<Item = [Vec3; 3]> {
+        self.pieces(patch).map(|(triangle, corners)| {
+            let triangle = &scene.triangles[triangle as usize];
+            corners.map(|(u, v)| triangle.position(u, v))
+        })
+    }
+
     /// Per patch, the distance below which it is too coarse to be treated as uniformly bright, canonical units: twice
     /// the length of its side, which is at most `side`.
     pub fn min_read_distances(&self, scene: &BakeScene, side: f32) -> Vec<f32> {
         let of_patch = |patch: &Patch| {
-            let [a, b, c] = self.corners(scene, patch);
-            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+            let longest_edge = |[a, b, c]: [Vec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
+            let diameter = match self.cluster(patch) {
+                None => self.facets(scene, patch).map(longest_edge).fold(0.0, f32::max),
+                Some(_) => {
+                    let (triangle, (u, v)) = self.middle(patch);
+                    let middle = scene.triangles[triangle as usize].position(u, v);
+                    let corners = self.facets(scene, patch).flatten();
+                    2.0 * corners.map(|corner| corner.distance(middle)).fold(0.0, f32::max)
+                }
+            };
             // The longest edge of half a square is the square's diagonal.
-            NEAR_SIDES * side.min(longest * FRAC_1_SQRT_2)
+            NEAR_SIDES * side.min(diameter * FRAC_1_SQRT_2)
         };
         self.list.iter().map(of_patch).collect()
-    }
-
-    /// The patch's corners, canonical units.
-    pub fn corners(&self, scene: &BakeScene, patch: &Patch) -> [Vec3; 3] {
-        let triangle = &scene.triangles[patch.triangle as usize];
-        CORNERS.map(|at| {
-            let (u, v) = self.point(patch, at);
-            triangle.position(u, v)
-        })
     }
 }
 
@@ -311,30 +417,29 @@ fn point_between([a, b, c]: &SubTriangle, u: f32, v: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
 }
 
-/// The mean reflectance of a part of a triangle. If it shows more texels than [`MAX_TEXTURE_POINTS`] allow for, also the
-/// number of texels along its longest edge.
-fn reflectance_and_texels(
+/// The mean reflectance of a part of a side of a triangle, from n² points with n up to `most_points`, and the texels that
+/// it shows.
+fn mean_reflectance(
     scene: &BakeScene,
-    index: usize,
-    side: Side,
-    corners: &SubTriangle,
-) -> (Vec3, Option<f32>) {
+    (index, side, corners): (usize, Side, SubTriangle),
+    most_points: u32,
+) -> (Vec3, ShownTexels) {
     let triangle = &scene.triangles[index];
     let surface = &scene.surfaces[triangle.surface as usize];
-    let texels = surface.reflectance_texels(triangle.vertices, *corners);
-    let points = texture_points(texels);
-    let n = if surface.varies() { (points.ceil() as u32).clamp(2, MAX_TEXTURE_POINTS) } else { 1 };
+    let texels = surface.reflectance_texels(triangle.vertices, corners);
+    let points = points_for(texels);
+    let n = if surface.varies() { (points.ceil() as u32).clamp(2, most_points) } else { 1 };
     let mean = mean_of_points(n, |(u, v)| {
-        let (u, v) = point_between(corners, u, v);
+        let (u, v) = point_between(&corners, u, v);
         surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
     });
-    (mean, (points > MAX_TEXTURE_POINTS as f32).then_some(texels.edge))
+    (mean, texels)
 }
 
 /// Points along a patch's edge, n for n² points in all, at which its textures are averaged. A few texels are averaged
 /// with a point for each of them along the longest edge, which makes at least two per texel. Of many, one point
 /// per texel is enough, and one for every two texels along an edge, since bilinear filtering reads two.
-fn texture_points(texels: ShownTexels) -> f32 {
+fn points_for(texels: ShownTexels) -> f32 {
     texels.edge.min(FEW_TEXELS).max(texels.area.sqrt()).max(0.5 * texels.edge)
 }
 

@@ -1,8 +1,11 @@
 //! How light is transported between the surfaces of a scene, whatever the light: patches, and the form factors between
 //! them. The light of the patches is found in `exchange`.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
+use super::face_clusters::JoinableFaces;
 use super::form_factors::FormFactors;
 use super::patches::Patches;
 use crate::monitor::BakeMonitor;
@@ -11,10 +14,14 @@ use crate::scene::BakeScene;
 use crate::{BakeError, BakeOptions};
 
 /// How finely the exchange of light is computed.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct PatchResolution {
     /// Side of a patch, canonical units.
     pub patch_side: f32,
+    /// The triangles that may share a patch.
+    pub joinable: Arc<JoinableFaces>,
+    /// Most points along a patch's edge at which textures are averaged.
+    pub texture_points: u32,
     /// Rays for all form factors together.
     pub form_factor_rays: usize,
     /// Upper estimate of the bytes that the bake then needs.
@@ -40,7 +47,9 @@ impl Transport {
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(Self, StageNotes), BakeError> {
         let side = resolution.patch_side;
-        let patches = monitor.run_interruptible(0.0, || Patches::new(scene, side))?;
+        let patches = monitor.run_interruptible(0.0, || {
+            Patches::new(scene, &resolution.joinable, side, resolution.texture_points)
+        })?;
         let (factors, halves) = match is_black(&patches) {
             true => (FormFactors::none(&patches), [FormFactors::default(), FormFactors::default()]),
             false => {

@@ -40,17 +40,27 @@ impl TriangleCells {
     }
 }
 
+/// The area of a cell that is as large as a patch of this side may be.
+pub(crate) fn cell_area(side: f32) -> f32 {
+    0.5 * side * side
+}
+
 /// Cells along each edge of a triangle.
 fn divisions(triangle: &SceneTriangle, side: f32) -> u32 {
     let [a, b, c] = triangle.corners;
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
     // As many as its area calls for; a sliver gets more, until its cells are at most four sides long.
-    let by_area = (triangle.area / (0.5 * side * side)).sqrt();
+    let by_area = (triangle.area / cell_area(side)).sqrt();
     by_area.max(longest / (4.0 * side)).ceil().clamp(1.0, 1024.0) as u32
 }
 
 /// Cells are cut only if their area is at least this share of that of a patch of the requested size.
 const MIN_CUT_CELL: f32 = 0.125;
+
+/// Whether the cells of a triangle are large enough to be cut.
+pub(crate) fn may_be_cut(triangle: &SceneTriangle, divisions: u32, side: f32) -> bool {
+    triangle.area >= MIN_CUT_CELL * cell_area(side) * (divisions * divisions) as f32
+}
 
 /// Cuts the cells of a triangle along the contact lines of what stands on it; returns the cells that were cut,
 /// ascending.
@@ -63,7 +73,7 @@ fn cut_cells(
 ) -> Vec<(u32, CutCell)> {
     let triangle = &scene.triangles[index];
     let cells = divisions * divisions;
-    if triangle.area < MIN_CUT_CELL * 0.5 * side * side * cells as f32 {
+    if !may_be_cut(triangle, divisions, side) {
         return Vec::new();
     }
     let frame = PlaneFrame::new(triangle);

@@ -47,8 +47,9 @@ impl UnseenRegions {
         let mut unseen = Self { places: Vec::new(), cube_of: Vec::new(), cubes: Vec::new() };
         for (region, radiosity) in RegionIndex::all(radiosity.len()).zip(radiosity) {
             let patch = &regions.patches.list[region.place()];
-            let centroid = regions.patches.corners(scene, patch).iter().sum::<Vec3>() / 3.0;
-            let normal = scene.triangles[patch.triangle as usize].side_normal(patch.side);
+            let (triangle, (u, v)) = regions.patches.middle(patch);
+            let triangle = &scene.triangles[triangle as usize];
+            let (centroid, normal) = (triangle.position(u, v), triangle.side_normal(patch.side));
             let cell: IVec3 = (centroid / (CUBE_SIDE * side)).floor().as_ivec3();
             let next = unseen.cubes.len() as u32;
             let number = *numbers.entry(cell.to_array()).or_insert(next);

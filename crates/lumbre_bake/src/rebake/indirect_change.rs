@@ -24,7 +24,7 @@ use crate::monitor::BakeMonitor;
 use crate::radiosity::solution::gather;
 use crate::radiosity::{Exchange, FormFactors, Patch, Patches};
 use crate::report::StageNotes;
-use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
+use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::{BakeScene, Receiver, Side, SurfaceHit};
 use crate::sources::{Direct, Sources};
 use crate::texel_index::MapTexel;
@@ -137,8 +137,8 @@ impl<'a> IndirectChange<'a> {
             }
             let sequence = Sequence::new(options.seed, Stream::ChangedPatches, index as u32);
             let point = |x: f32, y: f32| {
-                let at = patches.point(patch, triangle_point(x, y));
-                Some(Receiver::on_facet(self.scene, patch.triangle, patch.side, at))
+                let (triangle, at) = patches.point(patch, [x, y]);
+                Some(Receiver::on_facet(self.scene, triangle, patch.side, at))
             };
             self.sampled_change(sequence, &|_, x, y| point(x, y), light).means()
         })?;
@@ -178,7 +178,9 @@ impl<'a> IndirectChange<'a> {
             patch.side == Side::Back
                 && patch.reflectance != Vec3::ZERO
                 && (self.changes.lights_changed
-                    || self.changes.shadow_volumes.cross(&patches.corners(self.scene, patch)))
+                    || patches
+                        .facets(self.scene, patch)
+                        .any(|facet| self.changes.shadow_volumes.cross(&facet)))
         };
         patches.list.par_iter().map(is_unknown).collect()
     }

@@ -39,7 +39,7 @@ impl PlaneFrame {
 }
 
 /// Height above a patch, as a fraction of the patch's side, up to which a surface counts as standing or lying on it.
-const REACH: f64 = 0.1;
+pub(crate) const REACH: f64 = 0.1;
 /// Height at which a surface that stands on a triangle is intersected, as a fraction of the reach: above the rounding
 /// error of its corners.
 const LEVEL: f64 = 1.0 / 64.0;
