@@ -1,5 +1,6 @@
 //! Measures the memory that a bake of many patches uses: `peak_memory TRIANGLES_ALONG_A_WALL MAP_SIZE [--memory BYTES]
-//! [--final] [--glowing]`; with `--glowing` every triangle of the walls emits light.
+//! [--final] [--glowing] [--apart]`; with `--glowing` every triangle of the walls emits light, with `--apart` there are gaps
+//! between them, so that each of them is a patch.
 //!
 //! It reports the stages as they begin and prints, as JSON, the estimate, the peak memory of the process
 //! (VmHWM on Linux) before and after the bake, and the patches.
@@ -18,7 +19,7 @@ use lumbre_optics::{Material, Surface};
 use lumbre_scene::{Mesh, StaticObject};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let (mut numbers, mut glow) = (Vec::new(), 0.0);
+    let (mut numbers, mut glow, mut is_apart) = (Vec::new(), 0.0, false);
     let mut options =
         BakeOptions { quality: Quality::Draft, error: 0.5, threads: Some(2), ..BakeOptions::default() };
     let mut arguments = std::env::args().skip(1);
@@ -27,6 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--memory" => options.memory = Some(arguments.next().ok_or("--memory needs bytes")?.parse()?),
             "--final" => options.quality = Quality::Final,
             "--glowing" => glow = 0.1,
+            "--apart" => is_apart = true,
             _ => numbers.push(argument.parse::<u32>()?),
         }
     }
@@ -35,7 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut world = World::new();
     let mut walls = Material::matt(Vec3::splat(0.6));
     walls.front.emission = Vec3::splat(glow);
-    world.spawn((Mesh(Arc::new(room(along))), walls, StaticObject));
+    let room = if is_apart { apart(&room(along)) } else { room(along) };
+    world.spawn((Mesh(Arc::new(room)), walls, StaticObject));
     let lamp = Surface { emission: Vec3::splat(10.0), ..Surface::default() };
     let mut panel = TriangleMesh::default();
     wall(&mut panel, 1, Vec3::new(-0.3, 0.9, -0.3), [Vec3::X * 0.6, Vec3::Z * 0.6], Vec2::ZERO, 1.0);
@@ -102,6 +105,21 @@ fn wall(mesh: &mut TriangleMesh, n: u32, origin: Vec3, [a, b]: [Vec3; 2], uv: Ve
             mesh.indices.extend([p, p + 1, p + n + 2, p, p + n + 2, p + n + 1]);
         }
     }
+}
+
+/// The same triangles, each a little smaller and with vertices of its own.
+fn apart(mesh: &TriangleMesh) -> TriangleMesh {
+    let mut smaller = TriangleMesh::default();
+    for corners in mesh.indices.chunks_exact(3) {
+        let corners = corners.iter().map(|&corner| corner as usize);
+        let middle = corners.clone().map(|corner| mesh.positions[corner]).sum::<Vec3>() / 3.0;
+        for corner in corners {
+            smaller.indices.push(smaller.positions.len() as u32);
+            smaller.positions.push(mesh.positions[corner].lerp(middle, 0.01));
+            smaller.uv1.push(mesh.uv1[corner]);
+        }
+    }
+    smaller
 }
 
 /// The peak resident memory of this process in bytes.

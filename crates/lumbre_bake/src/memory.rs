@@ -19,9 +19,12 @@ use crate::{BakeError, BakeOptions};
 /// Per triangle of the scene: the triangle itself; while the hierarchy is built, its corners without and with an index,
 /// and two nodes of the binary tree; in the finished hierarchy, its lane of a block that may be half empty, and its
 /// share of the nodes of eight (256 bytes each, at worst one per four triangles); in the tree of boxes, its number and
-/// at worst one node; its neighbours for face clusters, and its place in those of the patches and of the larger ones.
+/// at worst one node; its neighbours for face clusters; its patches, and its place in a cluster and the cluster's, with
+/// what is allocated ahead, among the patches and among the larger ones. (The edges by which neighbours are found take
+/// less than the building of the hierarchy.)
 const TRIANGLE_BYTES: u64 =
-    (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32 + 12 + 2 * 16) as u64;
+    (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32 + 12 + 2 * (48 + 4 + 2 * 12))
+        as u64;
 
 /// Per covered texel, at the peak during the final gather: the texel and its direct light, its sums before and after a
 /// round, raw and smoothed estimates with their features, its nearness, nineteen lists of one number each for the
@@ -115,7 +118,7 @@ pub(crate) fn patch_resolution(
 ) -> Result<(PatchResolution, StageNotes), BakeError> {
     let effort = options.effort();
     let CoveredTexels { scene, layout, list: texels, contacts, side: texel_side, .. } = texels;
-    let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
+    let area = scene.triangles.iter().map(|triangle| f64::from(triangle.area)).sum::<f64>() as f32;
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let requested_rays = effort.form_factor_rays(texels.len(), options.error);
     let joinable = Arc::new(JoinableFaces::new(scene, side));

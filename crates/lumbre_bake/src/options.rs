@@ -157,7 +157,8 @@ impl Default for BakeOptions {
 /// The numbers behind a [`Quality`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
-    /// Most patches that the surface area is divided into. There may be more, as every triangle has at least one.
+    /// Most patches that the surface area is divided into. There may be more, as every
+    /// triangle has at least one that is not in a cluster with others.
     pub patches: usize,
     /// Rays for all form factors together, at least.
     pub form_factor_rays: usize,
@@ -265,7 +266,7 @@ impl BakeOptions {
             effort.form_factor_rays = effort.form_factor_rays.min(500_000);
             effort.form_factor_rays_per_texel = 0.0;
             effort.direct[1] = effort.direct[1].min(16);
-            // The mean of so many points is off by 3 % of a texture's contrast at worst, in one patch of many.
+            // The mean of so many points along an edge, squared, is off by 3 % of a texture's contrast at worst.
             effort.texture_points = effort.texture_points.min(16);
         }
         effort

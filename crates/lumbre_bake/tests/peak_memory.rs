@@ -46,10 +46,19 @@ fn the_estimate_counts_emitters() {
 #[test]
 #[ignore = "slow: scripts/test --all runs it"]
 fn two_hundred_thousand_patches_fit_in_four_gibibytes() {
-    let measured = peak_memory(&["130", "128", "--memory", "4294967296"]);
+    let measured = peak_memory(&["130", "128", "--apart", "--memory", "4294967296"]);
     assert!(measured["patches"].as_u64().unwrap() >= 200_000, "{measured}");
     assert!(
         measured["after"].as_u64().unwrap() <= 4 << 30 && measured["estimate"].as_u64().unwrap() <= 4 << 30,
         "{measured}"
     );
+}
+
+#[test]
+#[ignore = "slow: scripts/test --all runs it"]
+fn a_million_triangles_share_patches_and_stay_within_the_estimate() {
+    let measured = peak_memory(&["300", "64"]);
+    let number = |key: &str| measured[key].as_u64().unwrap();
+    assert!(number("patches") < 10_000, "{measured}");
+    assert!(number("after") - number("before") <= number("estimate"), "{measured}");
 }

@@ -85,8 +85,7 @@ pub fn nothing_to_bake_in(world: &mut World, name: &str) -> Option<String> {
     }
 }
 
-/// Static triangles from which on a quick report bakes less often. Each of them is a patch at least, and has a texel
-/// at least, so that a bake of many takes seconds, however few texels are asked for.
+/// Static triangles from which on a quick report bakes less often. Each of them has a texel at least, so that a bake of many takes seconds, however few texels are asked for.
 const MANY_TRIANGLES: usize = 5_000;
 
 /// Returns whether a quick report makes fewer bakes of a scene, because each of them takes seconds, and a sentence for

@@ -1,5 +1,7 @@
 //! Sampled light after smoothing, with the errors that are left in it. How it is smoothed is in `smooth`.
 
+use rayon::prelude::*;
+
 use super::nearness::Nearness;
 use super::neighbourhoods::Neighbourhoods;
 use super::replicates::{Estimates, spread};
@@ -19,8 +21,8 @@ pub(crate) struct Denoised {
 }
 
 impl Denoised {
-    /// Smooths `raw` estimates, unless `smooths` is false. `nearness` is, per texel, the mean of that of the surfaces or
-    /// lights that its samples reached.
+    /// Smooths `raw` estimates, unless `smooths` is false or there is no noise in them. `nearness` is, per texel, the mean
+    /// of that of the surfaces or lights that its samples reached.
     pub fn new(
         neighbourhoods: &Neighbourhoods<'_>,
         raw: &[Estimates],
@@ -28,6 +30,12 @@ impl Denoised {
         smooths: bool,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Self, BakeError> {
+        let is_noisy = |estimates: &Estimates| estimates.iter().any(|estimate| *estimate != estimates[0]);
+        if !raw.par_iter().any(is_noisy) {
+            let (expected, smoothing) = (vec![0.0; raw.len()], vec![0.0; raw.len()]);
+            let noise = SquaredErrors { cautious: expected.clone(), expected };
+            return Ok(Self { estimates: raw.to_vec(), noise, smoothing });
+        }
         let (estimates, smoothing) = monitor.run_interruptible(1.0, || match smooths {
             true => smooth(neighbourhoods, raw, nearness),
             false => (raw.to_vec(), vec![0.0; raw.len()]),
@@ -135,6 +143,9 @@ mod tests {
                 assert!(true_error < 0.7 * noise / (REPLICATES as f32).sqrt());
             }
         }
+        // Without noise, the light stays as it is.
+        let exact = left(|x, y| (x * y) as f32, 0.0, 10.0, true);
+        assert_eq!([exact.error, exact.noise, exact.smoothing], [0.0; 3]);
         // Without light to take away, hardly anything is stated for it.
         let flat = left(|_, _| 3.0, 0.4, f32::INFINITY, true);
         assert!(flat.smoothing < 0.02 * 0.4f32.powi(2) / REPLICATES as f32, "{}", flat.smoothing);

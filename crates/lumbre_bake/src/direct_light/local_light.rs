@@ -28,10 +28,9 @@ const MIN_WALKS: u32 = 8;
 const LATE_WALKS: u32 = 4;
 /// The most steps of a walk.
 const BOUNCES: u32 = 48;
-/// How many steps a walk takes to see something, however little light is left.
+/// The steps within which a walk notes what is in view, however little light is left.
 const STEPS_TO_SEE: u32 = 6;
-/// A walk ends where surfaces have absorbed all but this share of what they reflect: after six bounces where they reflect
-/// half of the light.
+/// A walk ends once its weight is below this: after seven bounces off surfaces that reflect half of the light.
 const LEAST_WEIGHT: f32 = 1.0 / 64.0;
 /// Blocks in view that a walk notes.
 const VIEW: usize = 2;
@@ -188,7 +187,7 @@ impl Walker<'_> {
             weight *= channel_mean(material.reflectance(side, surface.vertices, [1.0 - u - v, u, v]));
             let place = (side == Side::Front).then(|| self.covered_texel_at(triangle, (u, v))).flatten();
             if let Some(place) = place {
-                if seen < VIEW && distance >= nearest {
+                if seen < VIEW && bounce < STEPS_TO_SEE && distance >= nearest {
                     walk.in_view[seen] = Some(self.blocks.group_of[place.place()]);
                     seen += 1;
                 }

@@ -12,13 +12,16 @@ use crate::coverage::{CoveredTexels, Texel};
 use crate::denoise::REPLICATES;
 use crate::denoise::replicates::{mean, variance};
 use crate::monitor::BakeMonitor;
+use crate::sampling::hash;
 use crate::scene::Side;
 
 /// How many texels are compared with their patches, and the samples of each replicate that they gather for it.
 const PROBED: usize = 2048;
 const PROBE_SAMPLES: u32 = 2;
 /// Fewer texels than this say nothing about the others.
-const MIN_GATHERED: usize = 256;
+const MIN_PROBED: usize = 256;
+/// Estimated fraction of the stage's progress from now on.
+const PROBE_PROGRESS: f32 = 0.1;
 
 /// Where no more samples per replicate than this found only darkness, the patch says more than they do.
 const FEW_SAMPLES: u32 = 3;
@@ -38,10 +41,13 @@ pub(crate) fn from_patches(
     is_replaced: impl Fn(&GatherSums) -> bool,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(), BakeError> {
+    let is_replaced = |(texel, sums): &(&Texel, &mut GatherSums)| is_replaced(sums) && !texel.is_hidden();
+    if !texels.list.iter().zip(gathered.iter_mut()).any(|pair| is_replaced(&pair)) {
+        return Ok(());
+    }
+    monitor.pass(PROBE_PROGRESS);
     let relative_error = error_of_patches(cache, texels, seed, monitor)?;
-    for (texel, sums) in
-        texels.list.iter().zip(gathered).filter(|(texel, sums)| is_replaced(sums) && !texel.is_hidden())
-    {
+    for (texel, sums) in texels.list.iter().zip(gathered).filter(is_replaced) {
         let light = patch_light(cache, texel);
         *sums = GatherSums {
             sums: [light; REPLICATES],
@@ -70,11 +76,15 @@ fn error_of_patches(
     seed: u32,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<f64, BakeError> {
-    let open: Vec<&Texel> = texels.open().map(|(_, texel)| texel).collect();
-    if open.len() < MIN_GATHERED {
+    let open = texels.open().count();
+    if open < MIN_PROBED {
         return Ok(1.0);
     }
-    let probed: Vec<&Texel> = open.iter().copied().step_by(open.len().div_ceil(PROBED)).collect();
+    // One of each run of texels, at a random place, as regular ones could keep in step with the rows of a map.
+    let run = open.div_ceil(PROBED);
+    let is_probed = |place: &usize| place % run == hash(seed ^ (place / run) as u32) as usize % run;
+    let probed = texels.open().enumerate().filter(|(place, _)| is_probed(place));
+    let probed: Vec<&Texel> = probed.map(|(_, (_, texel))| texel).collect();
     let gathered: Vec<GatherSums> = in_chunks(probed.len(), monitor, |place| {
         let mut sums = GatherSums::default();
         cache.gather(probed[place], &mut sums, PROBE_SAMPLES, seed);

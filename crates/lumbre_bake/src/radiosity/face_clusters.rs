@@ -2,14 +2,15 @@
 //! the surfaces and not from how finely they are meshed (Willmott, Heckbert, Garland, "Face cluster radiosity", 1999;
 //! here on one level, as the patches have one size). Larger triangles are divided in `triangle_cells` instead.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
 
 use glam::Vec3;
-use lumbre_mesh::{Adjacency, weld_positions};
 use rayon::prelude::*;
 
-use super::triangle_cells::{cell_area, may_be_cut};
-use crate::scene::{BakeScene, SceneTriangle, Side};
+use super::triangle_cells::{cell_area, longest_edge, may_be_cut};
+use crate::sampling::interval_at;
+use crate::scene::{BakeScene, SceneTriangle, Side, position_bits};
 use crate::visibility::PlaneFrame;
 use crate::visibility::contacts::{REACH, contacts};
 
@@ -17,11 +18,14 @@ use crate::visibility::contacts::{REACH, contacts};
 const MAX_SHARE: f32 = 0.5;
 /// Least cosine between the normal of a triangle and that of its cluster's first one: 40 degrees.
 const MIN_COSINE: f32 = 0.766;
-/// How far a triangle's centroid may be from that of its cluster's first one, in sides of a patch.
+/// How far the corners of a cluster may be from the centroid of its first triangle, in sides of a patch.
 const MAX_DISTANCE: f32 = 1.0;
 /// Height above two adjacent triangles at which nothing may stand between them, as a share of the distance between their
 /// centroids. With the angle that [`MIN_COSINE`] allows, the segment at this height clears the edge between them.
 const HEIGHT: f32 = 0.25;
+
+/// Where more edges than this coincide, no triangles are joined across them: all are compared with each other.
+const MAX_EDGES: usize = 16;
 
 /// No triangle.
 const NONE: u32 = u32::MAX;
@@ -33,43 +37,59 @@ pub(crate) struct JoinableFaces {
     neighbours: Vec<[u32; 3]>,
 }
 
+/// A small triangle.
+struct Face {
+    triangle: u32,
+    /// Whether something lies closely above its front and its back.
+    covered: [bool; 2],
+}
+
+/// An edge of a small triangle, in the order by which equal edges come together.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Edge {
+    hash: u64,
+    /// The place of its face.
+    face: u32,
+    corner: u32,
+}
+
 impl JoinableFaces {
     /// For patches of `side` canonical units, and larger ones. Two triangles may share a patch if they are small, adjacent
     /// and about parallel, belong to the same surface, and nothing stands between them or lies on one of them only.
     pub fn new(scene: &BakeScene, side: f32) -> Self {
-        let triangles = &scene.triangles;
-        let limit = MAX_SHARE * cell_area(side);
-        let small: Vec<u32> = (0..triangles.len() as u32)
-            .filter(|&index| {
-                let triangle = &triangles[index as usize];
-                triangle.area <= limit && !triangle.is_hidden_duplicate
-            })
+        let faces: Vec<Face> = (0..scene.triangles.len() as u32)
+            .into_par_iter()
+            .filter_map(|index| face(scene, index, side))
             .collect();
-        if small.len() < 2 {
+        if faces.len() < 2 {
             return Self::default();
         }
-        let corners: Vec<Vec3> = small.iter().flat_map(|&index| triangles[index as usize].corners).collect();
-        let welded = weld_positions(&corners);
-        let faces: Vec<[u32; 3]> = welded.chunks_exact(3).map(|face| [face[0], face[1], face[2]]).collect();
-        let adjacency = Adjacency::new(&faces, corners.len());
-        // What lies on each of them; `None` where something stands on it.
-        let covers: Vec<Option<[bool; 2]>> =
-            small.par_iter().map(|&index| covers(scene, index, side)).collect();
-        let across = |place: u32, corner: usize| -> Option<u32> {
-            let pair = adjacency.across(place, corner);
-            let &[first, second] = pair else { return None };
-            let other = if first == place { second } else { first };
-            let is_alike =
-                covers[place as usize].is_some() && covers[place as usize] == covers[other as usize];
-            let indices = [first, second].map(|place| small[place as usize]);
-            (is_alike && !scene.stop.is_cancelled() && may_be_joined(scene, indices))
-                .then_some(small[other as usize])
+        let edges_of = |(place, face): (usize, &Face)| {
+            let corners = scene.triangles[face.triangle as usize].corners;
+            [0, 1, 2].map(|corner| {
+                let hash = edge_hash([corners[corner], corners[(corner + 1) % 3]]);
+                Edge { hash, face: place as u32, corner: corner as u32 }
+            })
         };
-        let of_face = |place: u32| [0, 1, 2].map(|corner| across(place, corner).unwrap_or(NONE));
-        let found: Vec<[u32; 3]> = (0..small.len() as u32).into_par_iter().map(of_face).collect();
-        let mut neighbours = vec![[NONE; 3]; triangles.len()];
-        for (index, found) in small.into_iter().zip(found) {
-            neighbours[index as usize] = found;
+        let mut edges: Vec<Edge> = faces.par_iter().enumerate().flat_map_iter(edges_of).collect();
+        edges.par_sort_unstable();
+        let pairs: Vec<[u32; 2]> = edges
+            .par_chunk_by(|a, b| a.hash == b.hash)
+            .flat_map_iter(|edges| joinable_pairs(scene, &faces, edges))
+            .collect();
+        let mut neighbours = vec![[NONE; 3]; scene.triangles.len()];
+        let mut join = |from: u32, to: u32| {
+            // Two faces may have more than one edge in common.
+            let places = &mut neighbours[from as usize];
+            if !places.contains(&to)
+                && let Some(place) = places.iter_mut().find(|place| **place == NONE)
+            {
+                *place = to;
+            }
+        };
+        for [a, b] in pairs {
+            join(a, b);
+            join(b, a);
         }
         Self { neighbours }
     }
@@ -80,44 +100,93 @@ impl JoinableFaces {
     }
 }
 
-/// Whether something lies closely above the centroid of each side of a triangle that takes part in light transport;
-/// `None` if something stands on the triangle.
-fn covers(scene: &BakeScene, index: u32, side: f32) -> Option<[bool; 2]> {
+/// A triangle as a face that may be joined with others: it is small, and nothing stands on it that it would be cut along.
+fn face(scene: &BakeScene, index: u32, side: f32) -> Option<Face> {
     let triangle = &scene.triangles[index as usize];
-    let is_crossed = || {
-        may_be_cut(triangle, 1, side) && !contacts(scene, index, &PlaneFrame::new(triangle), side).is_empty()
-    };
-    if scene.stop.is_cancelled() || is_crossed() {
+    let is_small =
+        triangle.area <= MAX_SHARE * cell_area(side) && longest_edge(triangle) <= MAX_DISTANCE * side;
+    if !is_small || triangle.is_hidden_duplicate || scene.stop.is_cancelled() {
         return None;
     }
-    let centroid = triangle.position(1.0 / 3.0, 1.0 / 3.0);
-    let reach = REACH as f32 * side;
-    let is_covered = |side| {
-        let normal = triangle.side_normal(side);
-        scene.blocked(scene.off_surface(index, side, centroid), centroid + normal * reach)
+    if may_be_cut(triangle, 1, side) && !contacts(scene, index, &PlaneFrame::new(triangle), side).is_empty() {
+        return None;
+    }
+    let is_covered = |of: Side| {
+        let origin = scene.off_surface(index, of, centroid(triangle));
+        scene.blocked(origin, raised(triangle, of, REACH as f32 * side))
     };
-    Some([is_covered(Side::Front), triangle.two_sided && is_covered(Side::Back)])
+    let covered = [is_covered(Side::Front), triangle.two_sided && is_covered(Side::Back)];
+    Some(Face { triangle: index, covered })
 }
 
-/// Whether two adjacent triangles, in ascending order, belong to the same surface, are about parallel, and nothing stands
-/// between them.
-fn may_be_joined(scene: &BakeScene, indices: [u32; 2]) -> bool {
-    let [first, second] = indices.map(|index| &scene.triangles[index as usize]);
+fn centroid(triangle: &SceneTriangle) -> Vec3 {
+    triangle.position(1.0 / 3.0, 1.0 / 3.0)
+}
+
+/// The point at this height above the centroid of a side of a triangle.
+fn raised(triangle: &SceneTriangle, side: Side, height: f32) -> Vec3 {
+    centroid(triangle) + triangle.side_normal(side) * height
+}
+
+/// The same for an edge in both directions.
+fn edge_hash(ends: [Vec3; 2]) -> u64 {
+    let mut bits = ends.map(position_bits);
+    bits.sort_unstable();
+    let mut hasher = DefaultHasher::new();
+    bits.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// The pairs of triangles that may be joined across edges of the same hash: of each surface, the two that have an edge in
+/// common, if no third one does.
+fn joinable_pairs<'a>(
+    scene: &'a BakeScene,
+    faces: &'a [Face],
+    edges: &'a [Edge],
+) -> impl Iterator<Item = [u32; 2]> + 'a {
+    let ends = |edge: &Edge| {
+        let corners = scene.triangles[faces[edge.face as usize].triangle as usize].corners;
+        let (from, to) = (edge.corner as usize, (edge.corner as usize + 1) % 3);
+        [corners[from], corners[to]].map(position_bits)
+    };
+    // In a surface of one orientation two adjacent triangles run along their edge in opposite directions.
+    let is_other_side = move |first: &Edge, second: &Edge| {
+        let ([a, b], [c, d]) = (ends(first), ends(second));
+        let [first, second] = [first, second].map(|edge| &faces[edge.face as usize]);
+        let triangles = [first, second].map(|face| &scene.triangles[face.triangle as usize]);
+        a == d && b == c && are_alike(triangles) && first.covered == second.covered
+    };
+    let pair = move |(place, edge): (usize, &Edge)| {
+        let mut across = edges.iter().enumerate().filter(|(_, other)| is_other_side(edge, other));
+        let (other, second) = across.next().filter(|_| across.next().is_none())?;
+        let is_only_one = edges.iter().filter(|third| is_other_side(third, second)).count() == 1;
+        let pair = [edge, second].map(|edge| faces[edge.face as usize].triangle);
+        (place < other && is_only_one && !scene.stop.is_cancelled() && is_open_between(scene, pair))
+            .then_some(pair)
+    };
+    let edges_to_pair = if edges.len() <= MAX_EDGES { edges } else { &[] };
+    edges_to_pair.iter().enumerate().filter_map(pair)
+}
+
+/// Whether two triangles belong to the same surface and are about parallel.
+fn are_alike([first, second]: [&SceneTriangle; 2]) -> bool {
     let surface = |triangle: &SceneTriangle| {
         let &SceneTriangle { map, surface, two_sided, closed, solid, .. } = triangle;
         (map, surface, two_sided, closed, solid)
     };
-    if surface(first) != surface(second) || first.normal.dot(second.normal) < MIN_COSINE {
-        return false;
-    }
-    let centroids = [first, second].map(|triangle| triangle.position(1.0 / 3.0, 1.0 / 3.0));
-    let height = HEIGHT * centroids[0].distance(centroids[1]);
-    let is_open = |sign: f32| {
-        let raised =
-            |place: usize, triangle: &SceneTriangle| centroids[place] + triangle.normal * (sign * height);
-        !scene.blocked(raised(0, first), raised(1, second))
-    };
-    is_open(1.0) && (!first.two_sided || is_open(-1.0))
+    surface(first) == surface(second) && first.normal.dot(second.normal) >= MIN_COSINE
+}
+
+/// Whether nothing stands between two adjacent triangles, on either side that takes part in light transport.
+fn is_open_between(scene: &BakeScene, pair: [u32; 2]) -> bool {
+    let [first, second] = pair.map(|index| &scene.triangles[index as usize]);
+    see_each_other(scene, [first, second], HEIGHT * centroid(first).distance(centroid(second)))
+}
+
+/// Whether points at this height above two triangles see each other, on either side that takes part in light transport.
+fn see_each_other(scene: &BakeScene, [first, second]: [&SceneTriangle; 2], height: f32) -> bool {
+    let on = |side| !scene.blocked(raised(first, side, height), raised(second, side, height));
+    on(Side::Front) && (!first.two_sided || on(Side::Back))
 }
 
 /// The clusters of a scene for one size of patches.
@@ -134,31 +203,35 @@ pub(crate) struct FaceClusters {
 
 impl FaceClusters {
     /// Grows clusters from one triangle after the other, over joinable neighbours, up to the area of a patch of `side`
-    /// canonical units.
+    /// canonical units. Then those triangles leave that do not see the first one of their cluster, as around the end of a
+    /// wall.
     pub fn new(scene: &BakeScene, joinable: &JoinableFaces, side: f32) -> Self {
         if joinable.neighbours.is_empty() {
             return Self::default();
         }
         let triangles = &scene.triangles;
-        let mut clusters =
-            Self { of: vec![NONE; triangles.len()], starts: vec![0], faces: Vec::new(), ends: Vec::new() };
+        let mut grown = Self { of: vec![NONE; triangles.len()], starts: vec![0], ..Self::default() };
         for seed in 0..triangles.len() as u32 {
-            let is_free = clusters.of[seed as usize] == NONE && joinable.of(seed).next().is_some();
-            if !is_free || scene.stop.is_cancelled() {
-                continue;
+            let is_free = grown.of[seed as usize] == NONE && joinable.of(seed).next().is_some();
+            if is_free && !scene.stop.is_cancelled() {
+                grown.grow(triangles, joinable, seed, side);
             }
-            clusters.grow(triangles, joinable, seed, side);
         }
-        clusters
+        let sees_first = |&face: &u32| {
+            let first = grown.faces(grown.of[face as usize])[0];
+            let pair = [first, face].map(|index| &triangles[index as usize]);
+            first == face || scene.stop.is_cancelled() || see_each_other(scene, pair, REACH as f32 * side)
+        };
+        let stays: Vec<bool> = grown.faces.par_iter().map(sees_first).collect();
+        grown.only(triangles, &stays)
     }
 
-    /// Grows a cluster from a triangle, and keeps it if another one joins.
+    /// Grows a cluster from a triangle.
     fn grow(&mut self, triangles: &[SceneTriangle], joinable: &JoinableFaces, seed: u32, side: f32) {
         let first = &triangles[seed as usize];
-        let centroid = |triangle: &SceneTriangle| triangle.position(1.0 / 3.0, 1.0 / 3.0);
         let (middle, limit) = (centroid(first), cell_area(side));
         let (number, start) = (self.starts.len() as u32 - 1, self.faces.len());
-        let mut area = first.area;
+        let mut area = f64::from(first.area);
         self.faces.push(seed);
         self.of[seed as usize] = number;
         // Breadth first, so that clusters are compact.
@@ -166,30 +239,52 @@ impl FaceClusters {
         while next < self.faces.len() {
             for other in joinable.of(self.faces[next]) {
                 let triangle = &triangles[other as usize];
-                let fits = area + triangle.area <= limit
+                let with_it = area + f64::from(triangle.area);
+                let fits = with_it <= f64::from(limit)
                     && triangle.normal.dot(first.normal) >= MIN_COSINE
-                    && centroid(triangle).distance(middle) <= MAX_DISTANCE * side;
+                    && triangle.corners.iter().all(|corner| corner.distance(middle) <= MAX_DISTANCE * side);
                 if fits && self.of[other as usize] == NONE {
                     self.of[other as usize] = number;
                     self.faces.push(other);
-                    area += triangle.area;
+                    area = with_it;
                 }
             }
             next += 1;
         }
-        if self.faces.len() == start + 1 {
-            self.faces.pop();
-            self.of[seed as usize] = NONE;
-            return;
-        }
         self.starts.push(self.faces.len() as u32);
-        let mut sum = 0.0;
-        for &face in &self.faces[start..] {
-            sum += triangles[face as usize].area;
-            self.ends.push(sum / area);
+    }
+
+    /// The same clusters with only those of their triangles that stay, and only those clusters that have more than one.
+    fn only(self, triangles: &[SceneTriangle], stays: &[bool]) -> Self {
+        let count = stays.iter().filter(|stays| **stays).count();
+        let (faces, ends) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let mut clusters = Self { of: self.of, starts: vec![0], faces, ends };
+        for range in self.starts.windows(2).map(|ends| ends[0] as usize..ends[1] as usize) {
+            let start = clusters.faces.len();
+            let staying = self.faces[range.clone()].iter().zip(&stays[range]).filter(|(_, stays)| **stays);
+            clusters.faces.extend(staying.map(|(face, _)| *face));
+            if clusters.faces.len() < start + 2 {
+                clusters.faces.truncate(start);
+                continue;
+            }
+            let area = |face: &u32| f64::from(triangles[*face as usize].area);
+            let (mut sum, total) = (0.0, clusters.faces[start..].iter().map(area).sum::<f64>());
+            for face in &clusters.faces[start..] {
+                sum += area(face);
+                clusters.ends.push((sum / total) as f32);
+            }
+            if let Some(last) = clusters.ends.last_mut() {
+                *last = 1.0;
+            }
+            clusters.starts.push(clusters.faces.len() as u32);
         }
-        self.ends.pop();
-        self.ends.push(1.0);
+        clusters.of.fill(NONE);
+        for cluster in 0..clusters.len() {
+            for face in &clusters.faces[clusters.range(cluster)] {
+                clusters.of[*face as usize] = cluster;
+            }
+        }
+        clusters
     }
 
     /// The number of clusters.
@@ -212,9 +307,8 @@ impl FaceClusters {
     pub fn pick(&self, cluster: u32, x: f32) -> (u32, f32) {
         let range = self.range(cluster);
         let ends = &self.ends[range.clone()];
-        let place = ends.partition_point(|&end| end <= x).min(ends.len() - 1);
-        let start = if place == 0 { 0.0 } else { ends[place - 1] };
-        let left = ((x - start) / (ends[place] - start)).clamp(0.0, 1.0 - f32::EPSILON);
+        let (place, begin, end) = interval_at(ends, |end| *end, x).unwrap_or((0, 0.0, 1.0));
+        let left = ((x - begin) / (end - begin).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0 - f32::EPSILON);
         (self.faces[range.start + place], left)
     }
 
@@ -232,6 +326,7 @@ mod tests {
     use super::super::patch_index::PatchIndex;
     use super::super::patches::Patches;
     use super::*;
+    use crate::bounds::Bounds;
     use crate::sampling::{Sequence, Stream};
 
     /// An edge of the mesh, a third of the way.
@@ -282,9 +377,13 @@ mod tests {
         patches
     }
 
-    fn position(scene: &BakeScene, patches: &Patches, patch: PatchIndex, [x, y]: [f32; 2]) -> Vec3 {
-        let (triangle, (u, v)) = patches.point(&patches.list[patch.place()], [x, y]);
-        scene.space.world(scene.triangles[triangle as usize].position(u, v)).as_vec3()
+    /// The centroids of the triangles of each patch, in the world.
+    fn centroids(scene: &BakeScene, patches: &Patches) -> Vec<Vec<Vec3>> {
+        let of_patch = |patch| {
+            let facets = patches.facets(scene, patch);
+            facets.map(|[a, b, c]| scene.space.world((a + b + c) / 3.0).as_vec3()).collect()
+        };
+        patches.list.iter().map(of_patch).collect()
     }
 
     #[test]
@@ -301,52 +400,70 @@ mod tests {
         // At 45 degrees. A gentle bend may lie within a patch.
         let bent = scene(&[&finely_meshed_floor(1.0)]);
         let patches = checked_patches(&bent, 0.4);
-        for patch in PatchIndex::all(patches.list.len()) {
-            let sides = [0.01, 0.3, 0.6, 0.99].map(|x| position(&bent, &patches, patch, [x, 0.5]).x > BEND);
-            assert!(sides.iter().all(|side| *side == sides[0]), "{patch:?}");
+        for centroids in centroids(&bent, &patches) {
+            assert!(centroids.iter().all(|at| (at.x > BEND) == (centroids[0].x > BEND)), "{centroids:?}");
         }
         let gentle = checked_patches(&scene(&[&finely_meshed_floor(0.2)]), 0.4);
         assert!(gentle.list.len() < patches.list.len());
     }
 
     #[test]
-    fn no_cluster_lies_on_both_sides_of_a_wall_or_partly_under_a_sheet() {
+    fn no_cluster_lies_on_both_sides_of_a_wall() {
         let floor = finely_meshed_floor(0.0);
-        // Along edges of the mesh, and across its triangles.
-        for x in [1.0, 0.731] {
-            let wall = square([x, 0.0, 0.0], Vec3::Z * 2.0, Vec3::Y);
+        // Along edges of the mesh, and across its triangles; on the floor, hovering closely above it, and sunk into it.
+        for (x, y) in [(1.0, 0.0), (0.731, 0.0), (0.731, 0.001), (0.731, -0.5)] {
+            let wall = square([x, y, 0.0], Vec3::Z * 2.0, Vec3::Y);
             let scene = scene(&[&floor, &wall]);
             let patches = checked_patches(&scene, 0.4);
             let mut clusters = 0;
-            for (index, patch) in PatchIndex::all(patches.list.len()).zip(&patches.list) {
-                let points = (0..16).map(|i| position(&scene, &patches, index, [i as f32 / 16.0, 0.5]).x - x);
-                let (low, high) =
-                    points.fold((f32::MAX, f32::MIN), |(low, high), x| (low.min(x), high.max(x)));
-                // A single triangle may be crossed: it is small.
-                let is_small = patch.area < 1e-3 * (scene.space.scale as f32).powi(2);
-                assert!(low * high >= 0.0 || is_small, "{low} {high}");
-                clusters += usize::from(!is_small);
+            for centroids in centroids(&scene, &patches).iter().filter(|centroids| centroids.len() > 1) {
+                assert!(centroids.iter().all(|at| (at.x > x) == (centroids[0].x > x)), "{centroids:?}");
+                clusters += 1;
             }
             assert!(clusters > 40, "{clusters}");
         }
-        // A sheet a little above the floor, higher than the triangles are long.
-        let sheet = square([0.35, 0.035, 0.45], Vec3::X, Vec3::Z);
-        let scene = scene(&[&floor, &sheet]);
+    }
+
+    #[test]
+    fn no_cluster_reaches_around_the_end_of_a_wall() {
+        let wall = square([0.731, 0.0, 0.0], Vec3::Z * 1.1, Vec3::Y);
+        let scene = scene(&[&finely_meshed_floor(0.0), &wall]);
         let patches = checked_patches(&scene, 0.4);
-        for patch in PatchIndex::all(patches.list.len()) {
-            let points = [0.01, 0.3, 0.6, 0.99].map(|x| position(&scene, &patches, patch, [x, 0.5]));
-            let margin = 0.02;
-            let is_under = |p: &Vec3| {
-                p.y < 0.01
-                    && (0.35 + margin..1.35 - margin).contains(&p.x)
-                    && (0.45 + margin..1.45 - margin).contains(&p.z)
-            };
-            let is_beside = |p: &Vec3| {
-                p.y < 0.01
-                    && !((0.35 - margin..1.35 + margin).contains(&p.x)
-                        && (0.45 - margin..1.45 + margin).contains(&p.z))
-            };
-            assert!(!(points.iter().any(is_under) && points.iter().any(is_beside)), "{points:?}");
+        for (patch, centroids) in patches.list.iter().zip(centroids(&scene, &patches)) {
+            let first = scene.space.world(centroid(&scene.triangles[patch.triangle as usize])).as_vec3();
+            for at in centroids.into_iter().filter(|at| (at.x > 0.731) != (first.x > 0.731)) {
+                // Where the segment to the first triangle passes the wall.
+                let z = first.z + (at.z - first.z) * (0.731 - first.x) / (at.x - first.x);
+                assert!(z > 1.1, "{first} {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_cluster_lies_partly_under_a_sheet() {
+        // A little above the floor, but higher than the triangles are long.
+        let sheet = square([0.35, 0.035, 0.45], Vec3::X, Vec3::Z);
+        let scene = scene(&[&finely_meshed_floor(0.0), &sheet]);
+        let patches = checked_patches(&scene, 0.4);
+        let is_under = |at: &Vec3| (0.35..1.35).contains(&at.x) && (0.45..1.45).contains(&at.z);
+        let on_floor = |centroids: &Vec<Vec3>| centroids[0].y < 0.01;
+        for centroids in centroids(&scene, &patches).iter().filter(|centroids| on_floor(centroids)) {
+            assert!(centroids.iter().all(|at| is_under(at) == is_under(&centroids[0])), "{centroids:?}");
+        }
+    }
+
+    #[test]
+    fn long_slivers_are_no_clusters() {
+        // A fan of slices that are ten times as long as a patch.
+        let rim =
+            |number: u32| 4.0 * Vec3::new((0.002 * number as f32).cos(), 0.0, (0.002 * number as f32).sin());
+        let fan: Vec<[Vec3; 3]> = (0..400).map(|slice| [Vec3::ZERO, rim(slice + 1), rim(slice)]).collect();
+        let scene = scene(&[&fan]);
+        let patches = checked_patches(&scene, 0.4);
+        for patch in &patches.list {
+            let Bounds { low, high } = patches.facets(&scene, patch).flatten().collect::<Bounds<Vec3>>();
+            let length = low.distance(high) / scene.space.scale as f32;
+            assert!(length < 4.1 * 0.4, "{length}");
         }
     }
 

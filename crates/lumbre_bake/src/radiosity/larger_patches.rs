@@ -11,7 +11,7 @@ use crate::scene::BakeScene;
 /// The larger patches, which are regions of the smaller ones.
 pub(crate) struct LargerPatches {
     pub patches: Patches,
-    /// For each smaller patch, the region in which its centroid lies.
+    /// For each smaller patch, the region in which its middle lies.
     pub of: Vec<RegionIndex>,
     /// For each region, the smaller patches that it contains, ascending.
     pub members: Vec<Vec<PatchIndex>>,

@@ -23,8 +23,8 @@ const SHADOW_RAYS: u32 = 8;
 /// The same from a smaller one, unless a reference is baked: the less it reflects into the scene, the less its noise
 /// matters. A power of two, as [`SHADOW_RAYS`].
 const SHADOW_RAYS_OF_SMALL: u32 = 4;
-/// A patch is small if it has less than this share of the mean area. Patches are cut to one side, so that only those of
-/// small triangles are smaller than most.
+/// A patch is small if it has less than this share of the mean area. Patches are cut to one size, so that only
+/// small triangles that are not in a cluster, small clusters and pieces of cut cells are smaller than most.
 const SMALL: f32 = 0.5;
 
 /// Mean direct irradiance of each patch, mixed lights included, by two halves of its texels, the fields of a

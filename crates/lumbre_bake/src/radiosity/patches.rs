@@ -7,7 +7,7 @@ use std::f32::consts::FRAC_1_SQRT_2;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::bsp::BspTrees;
@@ -86,17 +86,19 @@ pub(crate) struct Patches {
     pub warnings: Vec<String>,
 }
 
-/// Pieces of surface that are smaller than this share of a cell have fewer points, in proportion to their area. Their
-/// means are less exact, but they reflect less, and the mean over all that a cell would hold is as exact as a cell's.
+/// Pieces of surface that are smaller than this share of a cell have fewer points, in proportion to their area: their
+/// means are less exact, but they reflect less light.
 const FEWER_POINTS_BELOW: f32 = 0.25;
+/// As many points along its edge as any piece of surface may have.
+const FEWEST_TEXTURE_POINTS: u32 = 4;
 
 /// Most points along the edge of a piece of surface whose area is this share of a cell's, which may have `of_cell`.
 fn most_texture_points(of_cell: u32, share: f32) -> u32 {
     let share = (share / FEWER_POINTS_BELOW).min(1.0);
-    ((of_cell as f32 * share.sqrt()).ceil() as u32).max(2)
+    ((of_cell as f32 * share.sqrt()).ceil() as u32).max(FEWEST_TEXTURE_POINTS)
 }
-/// A texture that would take more points than this along a patch's edge is named in a warning, if the bake is to be exact
-/// or not.
+/// A texture that would take more points than this along a patch's edge is named in a warning, whether the bake is to be
+/// exact or not.
 const NAMED_ABOVE: f32 = 64.0;
 /// Texels along a patch's edge up to which each of them has a point.
 const FEW_TEXELS: f32 = 16.0;
@@ -184,7 +186,8 @@ impl Patches {
     fn push_cluster(&mut self, scene: &BakeScene, cluster: u32) -> TrianglePatches {
         let faces = self.clusters.faces(cluster);
         let triangle = &scene.triangles[faces[0] as usize];
-        let area = faces.iter().map(|&face| scene.triangles[face as usize].area).sum();
+        let area =
+            faces.iter().map(|&face| f64::from(scene.triangles[face as usize].area)).sum::<f64>() as f32;
         let (cell, reflectance) = (CLUSTER_FLAG | cluster, Vec3::ZERO);
         let mut push = |side| {
             self.list.push(Patch { triangle: faces[0], side, cell, area, reflectance });
@@ -258,22 +261,29 @@ impl Patches {
     /// Finds what each patch reflects, and warns of textures that are too fine for the patches.
     fn find_reflectances(&mut self, scene: &BakeScene, side: f32, texture_points: u32) {
         let of_patch = |patch: &Patch| {
-            let (mut sum, mut area, mut most_texels) = (Vec3::ZERO, 0.0, None::<f32>);
+            let triangle = &scene.triangles[patch.triangle as usize];
+            let surface = &scene.surfaces[triangle.surface as usize];
+            if !surface.varies() {
+                return (surface.reflectance(patch.side, triangle.vertices, [1.0 / 3.0; 3]), None);
+            }
+            let (mut sum, mut area, mut most_texels) = (DVec3::ZERO, 0.0, None::<f32>);
             for (triangle, corners) in self.pieces(patch) {
                 if scene.stop.is_cancelled() {
                     break;
                 }
-                let area_of_piece = area_share(&corners) * scene.triangles[triangle as usize].area;
+                // By rounding, the area of a very small piece may be 0.
+                let share = area_share(&corners).max(f32::MIN_POSITIVE);
+                let area_of_piece = share * scene.triangles[triangle as usize].area;
                 let most_points = most_texture_points(texture_points, area_of_piece / cell_area(side));
                 let piece = (triangle as usize, patch.side, corners);
                 let (reflectance, texels) = mean_reflectance(scene, piece, most_points);
-                sum += reflectance * area_of_piece;
-                area += area_of_piece;
+                sum += reflectance.as_dvec3() * f64::from(area_of_piece);
+                area += f64::from(area_of_piece);
                 if points_for(texels) > NAMED_ABOVE {
                     most_texels = Some(most_texels.map_or(texels.edge, |most| most.max(texels.edge)));
                 }
             }
-            (if area > 0.0 { sum / area } else { Vec3::ZERO }, most_texels)
+            (if area > 0.0 { (sum / area).as_vec3() } else { Vec3::ZERO }, most_texels)
         };
         let results: Vec<(Vec3, Option<f32>)> = self.list.par_iter().map(of_patch).collect();
         // Per object with a patch that shows too many texels, the most texels along a patch's edge.
@@ -345,7 +355,7 @@ impl Patches {
         (patch.triangle, if is_cluster { centroid } else { self.point_in_triangle(patch, centroid) })
     }
 
-    /// Whether light may pass directly from one point of a patch to another, as it is not flat.
+    /// Whether light may pass directly from one point of a patch to another, as it may not be flat.
     pub fn sees_itself(&self, index: PatchIndex) -> bool {
         self.cluster(&self.list[index.place()]).is_some()
     }
@@ -417,7 +427,7 @@ fn point_between([a, b, c]: &SubTriangle, u: f32, v: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
 }
 
-/// The mean reflectance of a part of a side of a triangle, from n² points with n up to `most_points`, and the texels that
+/// The mean reflectance of a part of a side of a triangle with textures or vertex colours, from n² points with n up to `most_points`, and the texels that
 /// it shows.
 fn mean_reflectance(
     scene: &BakeScene,
@@ -428,7 +438,7 @@ fn mean_reflectance(
     let surface = &scene.surfaces[triangle.surface as usize];
     let texels = surface.reflectance_texels(triangle.vertices, corners);
     let points = points_for(texels);
-    let n = if surface.varies() { (points.ceil() as u32).clamp(2, most_points) } else { 1 };
+    let n = (points.ceil() as u32).clamp(2, most_points);
     let mean = mean_of_points(n, |(u, v)| {
         let (u, v) = point_between(&corners, u, v);
         surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])

@@ -45,10 +45,15 @@ pub(crate) fn cell_area(side: f32) -> f32 {
     0.5 * side * side
 }
 
+/// The length of a triangle's longest edge, canonical units.
+pub(crate) fn longest_edge(triangle: &SceneTriangle) -> f32 {
+    let [a, b, c] = triangle.corners;
+    a.distance(b).max(b.distance(c)).max(c.distance(a))
+}
+
 /// Cells along each edge of a triangle.
 fn divisions(triangle: &SceneTriangle, side: f32) -> u32 {
-    let [a, b, c] = triangle.corners;
-    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    let longest = longest_edge(triangle);
     // As many as its area calls for; a sliver gets more, until its cells are at most four sides long.
     let by_area = (triangle.area / cell_area(side)).sqrt();
     by_area.max(longest / (4.0 * side)).ceil().clamp(1.0, 1024.0) as u32

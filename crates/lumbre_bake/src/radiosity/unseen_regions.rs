@@ -24,7 +24,7 @@ const MIN_GUESS: f64 = 3e-4;
 /// Where each region is, and which regions of each cube give off the most light.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct UnseenRegions {
-    /// Centroid and normal of each region.
+    /// The middle of each region, and its normal there.
     places: Vec<(Vec3, Vec3)>,
     /// The cube of each region.
     cube_of: Vec<u32>,
@@ -49,8 +49,8 @@ impl UnseenRegions {
             let patch = &regions.patches.list[region.place()];
             let (triangle, (u, v)) = regions.patches.middle(patch);
             let triangle = &scene.triangles[triangle as usize];
-            let (centroid, normal) = (triangle.position(u, v), triangle.side_normal(patch.side));
-            let cell: IVec3 = (centroid / (CUBE_SIDE * side)).floor().as_ivec3();
+            let (middle, normal) = (triangle.position(u, v), triangle.side_normal(patch.side));
+            let cell: IVec3 = (middle / (CUBE_SIDE * side)).floor().as_ivec3();
             let next = unseen.cubes.len() as u32;
             let number = *numbers.entry(cell.to_array()).or_insert(next);
             if number == next {
@@ -59,7 +59,7 @@ impl UnseenRegions {
             let cube = &mut unseen.cubes[number as usize];
             cube.area += f64::from(patch.area);
             cube.bright.push((region, radiosity * f64::from(patch.area)));
-            unseen.places.push((centroid, normal));
+            unseen.places.push((middle, normal));
             unseen.cube_of.push(number);
         }
         for cube in &mut unseen.cubes {
