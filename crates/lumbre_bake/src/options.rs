@@ -158,7 +158,7 @@ impl Default for BakeOptions {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
     /// Most patches that the surface area is divided into. There may be more, as every
-    /// triangle has at least one that is not in a cluster with others.
+    /// triangle outside of a cluster has at least one.
     pub patches: usize,
     /// Rays for all form factors together, at least.
     pub form_factor_rays: usize,
@@ -266,7 +266,8 @@ impl BakeOptions {
             effort.form_factor_rays = effort.form_factor_rays.min(500_000);
             effort.form_factor_rays_per_texel = 0.0;
             effort.direct[1] = effort.direct[1].min(16);
-            // The mean of so many points along an edge, squared, is off by 3 % of a texture's contrast at worst.
+            // For texels that vary at random, the mean of so many points along an edge, squared, is off by 3 % of their
+            // contrast.
             effort.texture_points = effort.texture_points.min(16);
         }
         effort

@@ -178,6 +178,7 @@ impl Walker<'_> {
                 SurfaceHit::Lit { triangle, side, at, distance } => (triangle, side, at, distance),
                 SurfaceHit::None => {
                     walk.indirect += weight * channel_mean(self.sources.sky);
+                    walk.in_gap = seen == 0 && bounce >= STEPS_TO_SEE;
                     return walk;
                 }
                 SurfaceHit::Back | SurfaceHit::Inside => break,

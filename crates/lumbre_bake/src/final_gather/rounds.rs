@@ -11,7 +11,6 @@ use super::first_round::{ROUND_PROGRESS, cast_first_round};
 use super::gather_sums::GatherSums;
 use super::learned_guide::learn;
 use super::map_error::MapError;
-use super::patch_fallback::from_patches;
 use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
 use super::round_goals::{CONVERGENCE_ORDER, ErrorLeft, TARGET};
@@ -59,9 +58,6 @@ const STALLED: f64 = 0.95;
 /// The gather ends after so many stalled rounds in a row. One alone says little: where much of the light comes through
 /// a gap that few rays find, the first rounds find out only how noisy it is.
 const MAX_STALLED_ROUNDS: u32 = 2;
-/// The light of patches is shown instead of that of a few rays if it leaves at most this share of the error: the outlines
-/// of patches are seen more easily than noise.
-const MUCH_BETTER: f64 = 0.6;
 /// As [`STALLED`], for a small step, which is not expected to reduce the error by much.
 const SMALL_STEP_STALLED: f64 = 0.995;
 
@@ -143,12 +139,7 @@ pub(crate) fn gather(
         let ended = Ended::after(false, is_late || monitor.is_late(), next.is_last);
         let rays_gain_nothing = is_hardly_reducible || stalled_rounds == MAX_STALLED_ROUNDS;
         if is_late || rays_gain_nothing || is_all_reused || next.is_last {
-            let is_rough = is_late && plan.is_none() && options.time.is_some();
-            let better = match is_rough {
-                true => planner.evaluate_patches(cache, &mut gathered, &reads, &result.error, monitor)?,
-                false => None,
-            };
-            break (better.unwrap_or(result), ended);
+            break (result, ended);
         }
         let variances = &result.reducible.expected;
         monitor.run_interruptible(1.0, || {
@@ -332,27 +323,6 @@ impl<'a> RoundPlanner<'a> {
         monitor.advance(1.0)?;
         let light = without_patch_bias(&denoised.estimates, &patches);
         Ok(RoundResult { light, variances, reducible: denoised.errors(), error, seconds })
-    }
-
-    /// The result with the light of patches instead of what a few rays have `gathered`, which is replaced then; `None` if
-    /// it is hardly better than a result with this error.
-    fn evaluate_patches(
-        &self,
-        cache: &RadianceCache<'_>,
-        gathered: &mut Vec<GatherSums>,
-        reads: &TexelReads,
-        error: &MapError,
-        monitor: &mut BakeMonitor<'_>,
-    ) -> Result<Option<RoundResult>, BakeError> {
-        let mut of_patches = gathered.clone();
-        from_patches(cache, self.texels, &mut of_patches, self.options.seed, |_| true, monitor)?;
-        let result = self.evaluate(&of_patches, reads, cache.exchange.residual_bound, monitor)?;
-        if result.error.relative > MUCH_BETTER * error.relative {
-            monitor.note_error(error.worst());
-            return Ok(None);
-        }
-        *gathered = of_patches;
-        Ok(Some(result))
     }
 
     /// The error that is left after a round, and the part of it that rays reduce.

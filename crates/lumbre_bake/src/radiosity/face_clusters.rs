@@ -24,6 +24,8 @@ const MAX_DISTANCE: f32 = 1.0;
 /// centroids. With the angle that [`MIN_COSINE`] allows, the segment at this height clears the edge between them.
 const HEIGHT: f32 = 0.25;
 
+/// Rounds in which clusters grow from triangles that had to leave others; what is left after them is alone.
+const ROUNDS: usize = 8;
 /// Where more edges than this coincide, no triangles are joined across them: all are compared with each other.
 const MAX_EDGES: usize = 16;
 
@@ -73,10 +75,15 @@ impl JoinableFaces {
         };
         let mut edges: Vec<Edge> = faces.par_iter().enumerate().flat_map_iter(edges_of).collect();
         edges.par_sort_unstable();
-        let pairs: Vec<[u32; 2]> = edges
+        let mut pairs: Vec<[u32; 2]> = edges
             .par_chunk_by(|a, b| a.hash == b.hash)
             .flat_map_iter(|edges| joinable_pairs(scene, &faces, edges))
             .collect();
+        if pairs.is_empty() {
+            return Self::default();
+        }
+        // Clusters are not to depend on the order of hashes, which may differ from one compiler to the next.
+        pairs.par_sort_unstable();
         let mut neighbours = vec![[NONE; 3]; scene.triangles.len()];
         let mut join = |from: u32, to: u32| {
             // Two faces may have more than one edge in common.
@@ -204,33 +211,44 @@ pub(crate) struct FaceClusters {
 impl FaceClusters {
     /// Grows clusters from one triangle after the other, over joinable neighbours, up to the area of a patch of `side`
     /// canonical units. Then those triangles leave that do not see the first one of their cluster, as around the end of a
-    /// wall.
+    /// wall, and others grow from them.
     pub fn new(scene: &BakeScene, joinable: &JoinableFaces, side: f32) -> Self {
         if joinable.neighbours.is_empty() {
             return Self::default();
         }
         let triangles = &scene.triangles;
-        let mut grown = Self { of: vec![NONE; triangles.len()], starts: vec![0], ..Self::default() };
-        for seed in 0..triangles.len() as u32 {
-            let is_free = grown.of[seed as usize] == NONE && joinable.of(seed).next().is_some();
-            if is_free && !scene.stop.is_cancelled() {
-                grown.grow(triangles, joinable, seed, side);
+        let mut clusters = Self { of: vec![NONE; triangles.len()], starts: vec![0], ..Self::default() };
+        let sees_first = |clusters: &Self, face: u32| {
+            let first = clusters.faces(clusters.of[face as usize])[0];
+            let pair = [first, face].map(|index| &triangles[index as usize]);
+            first == face || see_each_other(scene, pair, REACH as f32 * side)
+        };
+        for round in 0..ROUNDS {
+            let (kept, kept_faces) = (clusters.len(), clusters.faces.len());
+            for seed in 0..triangles.len() as u32 {
+                let is_free = clusters.of[seed as usize] == NONE && joinable.of(seed).next().is_some();
+                if is_free && !scene.stop.is_cancelled() {
+                    clusters.grow(triangles, joinable, seed, side);
+                }
+            }
+            let stays: Vec<bool> = clusters.faces[kept_faces..]
+                .par_iter()
+                .map(|&face| scene.stop.is_cancelled() || sees_first(&clusters, face))
+                .collect();
+            let all_stay = stays.iter().all(|stays| *stays);
+            clusters.retain(kept, &stays);
+            if all_stay || round + 1 == ROUNDS {
+                break;
             }
         }
-        let sees_first = |&face: &u32| {
-            let first = grown.faces(grown.of[face as usize])[0];
-            let pair = [first, face].map(|index| &triangles[index as usize]);
-            first == face || scene.stop.is_cancelled() || see_each_other(scene, pair, REACH as f32 * side)
-        };
-        let stays: Vec<bool> = grown.faces.par_iter().map(sees_first).collect();
-        grown.only(triangles, &stays)
+        clusters.without_single_faces(triangles)
     }
 
     /// Grows a cluster from a triangle.
     fn grow(&mut self, triangles: &[SceneTriangle], joinable: &JoinableFaces, seed: u32, side: f32) {
         let first = &triangles[seed as usize];
         let (middle, limit) = (centroid(first), cell_area(side));
-        let (number, start) = (self.starts.len() as u32 - 1, self.faces.len());
+        let (number, start) = (self.len(), self.faces.len());
         let mut area = f64::from(first.area);
         self.faces.push(seed);
         self.of[seed as usize] = number;
@@ -254,37 +272,46 @@ impl FaceClusters {
         self.starts.push(self.faces.len() as u32);
     }
 
-    /// The same clusters with only those of their triangles that stay, and only those clusters that have more than one.
-    fn only(self, triangles: &[SceneTriangle], stays: &[bool]) -> Self {
-        let count = stays.iter().filter(|stays| **stays).count();
-        let (faces, ends) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        let mut clusters = Self { of: self.of, starts: vec![0], faces, ends };
+    /// Leaves only those triangles in the clusters from `first` on that stay. The first one of a cluster always does.
+    fn retain(&mut self, first: u32, stays: &[bool]) {
+        let (begin, ends) = (self.starts[first as usize] as usize, self.starts.split_off(first as usize + 1));
+        let faces = self.faces.split_off(begin);
+        let mut place = 0;
+        for end in ends {
+            while begin + place < end as usize {
+                match stays[place] {
+                    true => self.faces.push(faces[place]),
+                    false => self.of[faces[place] as usize] = NONE,
+                }
+                place += 1;
+            }
+            self.starts.push(self.faces.len() as u32);
+        }
+    }
+
+    /// The clusters of more than one triangle, complete with the shares of their triangles.
+    fn without_single_faces(mut self, triangles: &[SceneTriangle]) -> Self {
+        let mut clusters = Self { starts: vec![0], ..Self::default() };
+        self.of.fill(NONE);
         for range in self.starts.windows(2).map(|ends| ends[0] as usize..ends[1] as usize) {
-            let start = clusters.faces.len();
-            let staying = self.faces[range.clone()].iter().zip(&stays[range]).filter(|(_, stays)| **stays);
-            clusters.faces.extend(staying.map(|(face, _)| *face));
-            if clusters.faces.len() < start + 2 {
-                clusters.faces.truncate(start);
+            let faces = &self.faces[range];
+            if faces.len() < 2 {
                 continue;
             }
             let area = |face: &u32| f64::from(triangles[*face as usize].area);
-            let (mut sum, total) = (0.0, clusters.faces[start..].iter().map(area).sum::<f64>());
-            for face in &clusters.faces[start..] {
+            let (mut sum, total) = (0.0, faces.iter().map(area).sum::<f64>());
+            for face in faces {
                 sum += area(face);
                 clusters.ends.push((sum / total) as f32);
+                self.of[*face as usize] = clusters.len();
             }
             if let Some(last) = clusters.ends.last_mut() {
                 *last = 1.0;
             }
+            clusters.faces.extend_from_slice(faces);
             clusters.starts.push(clusters.faces.len() as u32);
         }
-        clusters.of.fill(NONE);
-        for cluster in 0..clusters.len() {
-            for face in &clusters.faces[clusters.range(cluster)] {
-                clusters.of[*face as usize] = cluster;
-            }
-        }
-        clusters
+        Self { of: self.of, ..clusters }
     }
 
     /// The number of clusters.
@@ -429,14 +456,23 @@ mod tests {
         let wall = square([0.731, 0.0, 0.0], Vec3::Z * 1.1, Vec3::Y);
         let scene = scene(&[&finely_meshed_floor(0.0), &wall]);
         let patches = checked_patches(&scene, 0.4);
+        // As many as without the wall, but for some: what is cut off from one cluster grows into others.
+        let without = checked_patches(&self::scene(&[&finely_meshed_floor(0.0)]), 0.4).list.len();
+        let on_floor =
+            patches.list.iter().filter(|patch| scene.triangles[patch.triangle as usize].map.0 == 0);
+        let on_floor = on_floor.count();
+        assert!(on_floor < without + without / 2, "{on_floor} {without}");
+        let mut around = 0;
         for (patch, centroids) in patches.list.iter().zip(centroids(&scene, &patches)) {
             let first = scene.space.world(centroid(&scene.triangles[patch.triangle as usize])).as_vec3();
             for at in centroids.into_iter().filter(|at| (at.x > 0.731) != (first.x > 0.731)) {
                 // Where the segment to the first triangle passes the wall.
                 let z = first.z + (at.z - first.z) * (0.731 - first.x) / (at.x - first.x);
                 assert!(z > 1.1, "{first} {at}");
+                around += 1;
             }
         }
+        assert!(around > 0, "beyond the wall, clusters lie on both sides of its plane");
     }
 
     #[test]
@@ -447,9 +483,12 @@ mod tests {
         let patches = checked_patches(&scene, 0.4);
         let is_under = |at: &Vec3| (0.35..1.35).contains(&at.x) && (0.45..1.45).contains(&at.z);
         let on_floor = |centroids: &Vec<Vec3>| centroids[0].y < 0.01;
+        let mut clusters = [0, 0];
         for centroids in centroids(&scene, &patches).iter().filter(|centroids| on_floor(centroids)) {
             assert!(centroids.iter().all(|at| is_under(at) == is_under(&centroids[0])), "{centroids:?}");
+            clusters[usize::from(is_under(&centroids[0]))] += usize::from(centroids.len() > 1);
         }
+        assert!(clusters.iter().all(|&count| count > 12), "{clusters:?}");
     }
 
     #[test]

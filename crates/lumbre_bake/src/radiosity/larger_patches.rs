@@ -13,7 +13,7 @@ pub(crate) struct LargerPatches {
     pub patches: Patches,
     /// For each smaller patch, the region in which its middle lies.
     pub of: Vec<RegionIndex>,
-    /// For each region, the smaller patches that it contains, ascending.
+    /// For each region, the smaller patches whose middle lies in it, ascending.
     pub members: Vec<Vec<PatchIndex>>,
 }
 

@@ -97,6 +97,7 @@ fn most_texture_points(of_cell: u32, share: f32) -> u32 {
     let share = (share / FEWER_POINTS_BELOW).min(1.0);
     ((of_cell as f32 * share.sqrt()).ceil() as u32).max(FEWEST_TEXTURE_POINTS)
 }
+
 /// A texture that would take more points than this along a patch's edge is named in a warning, whether the bake is to be
 /// exact or not.
 const NAMED_ABOVE: f32 = 64.0;

@@ -98,7 +98,7 @@ fn hidden_texels_of_a_large_map_are_found_without_any_time() {
         let options = BakeOptions {
             density: Density::TexelsPerMeter(50.0),
             quality: Quality::Draft,
-            error: 0.2,
+            error: 0.01,
             time,
             ..options()
         };
