@@ -19,9 +19,9 @@ use crate::{BakeError, BakeOptions};
 /// Per triangle of the scene: the triangle itself; while the hierarchy is built, its corners without and with an index,
 /// and two nodes of the binary tree; in the finished hierarchy, its lane of a block that may be half empty, and its
 /// share of the nodes of eight (256 bytes each, at worst one per four triangles); in the tree of boxes, its number and
-/// at worst one node; its neighbours for face clusters; where its patches are, its
-/// number and its share in a cluster, with what is allocated ahead, both among the patches and among the larger ones. (The edges by which neighbours are found take
-/// less than the building of the hierarchy.)
+/// at worst one node; its neighbours for face clusters; where its patches are, its number and its share in a cluster, with
+/// what is allocated ahead, both among the patches and among the larger ones. (The edges by which neighbours are found
+/// take less than the building of the hierarchy.)
 const TRIANGLE_BYTES: u64 =
     (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32 + 12 + 2 * (48 + 4 + 2 * 12))
         as u64;

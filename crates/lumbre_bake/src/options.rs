@@ -157,8 +157,8 @@ impl Default for BakeOptions {
 /// The numbers behind a [`Quality`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
-    /// Most patches that the surface area is divided into. There may be more, as every
-    /// triangle outside of a cluster has at least one.
+    /// Most patches that the surface area is divided into. There may be more, as every triangle outside
+    /// of a cluster has at least one.
     pub patches: usize,
     /// Rays for all form factors together, at least.
     pub form_factor_rays: usize,

@@ -86,11 +86,8 @@ impl JoinableFaces {
         pairs.par_sort_unstable();
         let mut neighbours = vec![[NONE; 3]; scene.triangles.len()];
         let mut join = |from: u32, to: u32| {
-            // Two faces may have more than one edge in common.
-            let places = &mut neighbours[from as usize];
-            if !places.contains(&to)
-                && let Some(place) = places.iter_mut().find(|place| **place == NONE)
-            {
+            // There is a place for each edge, and across each there is one neighbour at most.
+            if let Some(place) = neighbours[from as usize].iter_mut().find(|place| **place == NONE) {
                 *place = to;
             }
         };
@@ -223,7 +220,7 @@ impl FaceClusters {
             let pair = [first, face].map(|index| &triangles[index as usize]);
             first == face || see_each_other(scene, pair, REACH as f32 * side)
         };
-        for round in 0..ROUNDS {
+        for _ in 0..ROUNDS {
             let (kept, kept_faces) = (clusters.len(), clusters.faces.len());
             for seed in 0..triangles.len() as u32 {
                 let is_free = clusters.of[seed as usize] == NONE && joinable.of(seed).next().is_some();
@@ -235,9 +232,8 @@ impl FaceClusters {
                 .par_iter()
                 .map(|&face| scene.stop.is_cancelled() || sees_first(&clusters, face))
                 .collect();
-            let all_stay = stays.iter().all(|stays| *stays);
             clusters.retain(kept, &stays);
-            if all_stay || round + 1 == ROUNDS {
+            if stays.iter().all(|stays| *stays) {
                 break;
             }
         }

@@ -272,14 +272,15 @@ impl Patches {
                 if scene.stop.is_cancelled() {
                     break;
                 }
-                // By rounding, the area of a very small piece may be 0.
-                let share = area_share(&corners).max(f32::MIN_POSITIVE);
-                let area_of_piece = share * scene.triangles[triangle as usize].area;
-                let most_points = most_texture_points(texture_points, area_of_piece / cell_area(side));
+                // By rounding, the share of a very small piece may be 0.
+                let share = f64::from(area_share(&corners).max(f32::MIN_POSITIVE));
+                let area_of_piece = share * f64::from(scene.triangles[triangle as usize].area);
+                let share_of_cell = area_of_piece as f32 / cell_area(side);
+                let most_points = most_texture_points(texture_points, share_of_cell);
                 let piece = (triangle as usize, patch.side, corners);
                 let (reflectance, texels) = mean_reflectance(scene, piece, most_points);
-                sum += reflectance.as_dvec3() * f64::from(area_of_piece);
-                area += f64::from(area_of_piece);
+                sum += reflectance.as_dvec3() * area_of_piece;
+                area += area_of_piece;
                 if points_for(texels) > NAMED_ABOVE {
                     most_texels = Some(most_texels.map_or(texels.edge, |most| most.max(texels.edge)));
                 }
