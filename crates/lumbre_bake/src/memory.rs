@@ -3,16 +3,15 @@
 //! measured peak.
 
 use std::mem::size_of;
-use std::sync::Arc;
 
 use crate::coverage::{CoveredTexels, Footprint, FootprintPoint, Texel};
 use crate::denoise::texel_rows::BESIDE_A_ROW;
 use crate::denoise::{Estimates, Nearness};
 use crate::error::mebibytes;
 use crate::final_gather::{GatherSums, TexelRadiance};
-use crate::radiosity::{JoinableFaces, Patch, PatchResolution, Patches};
+use crate::radiosity::{Patch, PatchResolution, Patches, Subdivision};
 use crate::report::StageNotes;
-use crate::scene::{LightmapLayout, SceneTriangle};
+use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::sources::{Direct, Sources};
 use crate::{BakeError, BakeOptions};
 
@@ -121,10 +120,9 @@ pub(crate) fn patch_resolution(
     let area = scene.triangles.iter().map(|triangle| f64::from(triangle.area)).sum::<f64>() as f32;
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let requested_rays = effort.form_factor_rays(texels.len(), options.error);
-    let joinable = Arc::new(JoinableFaces::new(scene, side));
+    let (subdivision, requested_patches) = choose_subdivision(scene, side, effort.pieces_by_cuts);
     let mut resolution = PatchResolution {
-        patch_side: side,
-        joinable: Arc::clone(&joinable),
+        subdivision,
         texture_points: effort.texture_points,
         form_factor_rays: requested_rays,
         memory_bytes: 0,
@@ -138,7 +136,6 @@ pub(crate) fn patch_resolution(
         + footprint_points.sum::<u64>() * size_of::<FootprintPoint>() as u64
         + contacts.bytes()
         + map_bytes(layout, options);
-    let requested_patches = Patches::count(scene, &joinable, side);
     let (mut patches, mut is_coarsest) = (requested_patches, false);
     loop {
         let needed = texel_bytes + scene_bytes(sources) + OTHER_BYTES + exchange_bytes(&resolution, patches);
@@ -152,14 +149,22 @@ pub(crate) fn patch_resolution(
         if is_coarsest {
             return Err(BakeError::Memory { needed, texels: texel_bytes, covered, limit });
         }
-        resolution.patch_side *= std::f32::consts::SQRT_2;
+        let larger = resolution.subdivision.side * std::f32::consts::SQRT_2;
+        let (subdivision, fewer) = choose_subdivision(scene, larger, effort.pieces_by_cuts);
+        resolution.subdivision = subdivision;
         resolution.form_factor_rays /= 2;
-        let fewer = Patches::count(scene, &joinable, resolution.patch_side);
         is_coarsest = fewer == patches && resolution.form_factor_rays == 0;
         patches = fewer;
     }
     let mut notes = StageNotes::default();
-    if resolution.patch_side > side {
+    let most_lines = resolution.subdivision.most_lines;
+    if resolution.subdivision.has_few_lines() {
+        notes.warnings.push(format!(
+            "so many surfaces cross each other that patches are cut along {most_lines} contact line(s) at most; light that bounces off near \
+             the others mixes (a smaller error, without a time limit, cuts along more of them)"
+        ));
+    }
+    if resolution.subdivision.side > side {
         notes.warnings.push(format!(
             "{patches} patches instead of {requested_patches}, and {} form factor rays instead of {requested_rays}, so that the bake stays within {}",
             resolution.form_factor_rays,
@@ -172,6 +177,20 @@ pub(crate) fn patch_resolution(
         scene.triangles.len()
     );
     Ok((resolution, notes))
+}
+
+/// Patches of about `side` canonical units, with as many lines to cut cells along as add no more than `most_pieces`
+/// patches, but at least one; and the number of patches.
+fn choose_subdivision(scene: &BakeScene, side: f32, most_pieces: Option<u64>) -> (Subdivision, u64) {
+    let mut subdivision = Subdivision::new(scene, side);
+    loop {
+        let fewer = subdivision.with_fewer_lines();
+        let most_pieces = most_pieces.filter(|_| fewer.is_some()).unwrap_or(u64::MAX);
+        match (Patches::count(scene, &subdivision, most_pieces), fewer) {
+            (None, Some(fewer)) => subdivision = fewer,
+            (count, _) => return (subdivision, count.unwrap_or_default()),
+        }
+    }
 }
 
 /// Bytes for the scene and its emitters. A bake with probes may list the emitters that light them once more.

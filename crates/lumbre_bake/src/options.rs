@@ -168,6 +168,9 @@ pub(crate) struct Effort {
     pub form_factor_rays_per_texel: f64,
     /// Smallest side of a patch, in texels.
     pub patch_texels: f32,
+    /// Most patches that cutting along contact lines may add, if there is a limit. Where many surfaces cross each other,
+    /// as leaves do, there could be dozens per triangle.
+    pub pieces_by_cuts: Option<u64>,
     /// Most points along the edge of a patch at which its textures are averaged.
     pub texture_points: u32,
     /// Shadow samples per texel: in the first pass, in the pass over suspected penumbrae, and at most.
@@ -196,6 +199,7 @@ impl Quality {
                 form_factor_rays: 600_000,
                 form_factor_rays_per_texel: 0.0,
                 patch_texels: 6.0,
+                pieces_by_cuts: Some(MAX_PIECES_BY_CUTS),
                 texture_points: 16,
                 direct: [4, 16, 16],
                 shared: [8, 64],
@@ -207,6 +211,7 @@ impl Quality {
                 form_factor_rays: 1_500_000,
                 form_factor_rays_per_texel: 0.04,
                 patch_texels: 4.0,
+                pieces_by_cuts: None,
                 texture_points: 64,
                 direct: [8, 64, 1024],
                 shared: [8, 8192],
@@ -218,6 +223,7 @@ impl Quality {
                 form_factor_rays: 20_000_000,
                 form_factor_rays_per_texel: 0.0,
                 patch_texels: 2.0,
+                pieces_by_cuts: None,
                 texture_points: 64,
                 direct: [64, 1024, 4096],
                 shared: [256, 8192],
@@ -240,6 +246,10 @@ impl Effort {
         (texels * u64::from(self.mean)).max(SMALL_BUDGET)
     }
 }
+
+/// Most patches that cutting adds where a preview is wanted or time is short: each casts some rays, and as many take about
+/// a second.
+const MAX_PIECES_BY_CUTS: u64 = 64_000;
 
 /// Limit of the form factor rays by the number of texels, as a multiple of their least number.
 const MAX_MORE_FORM_FACTOR_RAYS: usize = 4;
@@ -269,6 +279,7 @@ impl BakeOptions {
             // For texels that vary at random, the mean of so many points along an edge, squared, is off by 3 % of their
             // contrast.
             effort.texture_points = effort.texture_points.min(16);
+            effort.pieces_by_cuts = Some(MAX_PIECES_BY_CUTS);
         }
         effort
     }

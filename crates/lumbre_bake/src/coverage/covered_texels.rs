@@ -37,16 +37,17 @@ impl<'a> CoveredTexels<'a> {
         layout: &'a LightmapLayout,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(Self, StageNotes), BakeError> {
-        let (mut list, charts, contacts) = monitor.run_interruptible(0.0, || {
+        let (mut list, charts, (contacts, hiding)) = monitor.run_interruptible(0.0, || {
             (footprints(scene, layout), charts(scene), contact_lines(scene, layout))
         })?;
         // Divided texels are found twice: first from the whole footprints, as they may hide something that rays miss,
         // and again from the footprints that are left once hidden parts are removed.
         let maybe_divided: Vec<MapTexel> = monitor.run_interruptible(0.0, || {
-            let divided = divided_texels(&list, &open_by_place(layout, &list), &contacts);
+            let divided = divided_texels(&list, &open_by_place(layout, &list), &hiding);
             divided.iter().map(|texel| list[texel.place()].index).collect()
         })?;
-        let (hidden, rays) = remove_hidden(scene, layout, &mut list, &contacts, &maybe_divided, monitor)?;
+        let (hidden, rays) = remove_hidden(scene, layout, &mut list, &hiding, &maybe_divided, monitor)?;
+        drop(hiding);
         let open_by_place = open_by_place(layout, &list);
         let divided = monitor.run_interruptible(1.0, || divided_texels(&list, &open_by_place, &contacts))?;
         let area: f64 = scene.triangles.iter().map(|triangle| f64::from(triangle.area)).sum();

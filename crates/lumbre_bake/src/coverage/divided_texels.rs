@@ -12,25 +12,28 @@ use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::visibility::PlaneFrame;
 use crate::visibility::clipping::clip_segment;
-use crate::visibility::contacts::contacts;
+use crate::visibility::contacts::{Contact, contacts};
 
 /// Length, in texels, below which a contact line does not divide a texel.
 const MIN_LENGTH: f64 = 0.25;
 /// Distance from a line, in texels, up to which a point counts as on the line and not beyond it.
 const MARGIN: f64 = 0.05;
 
-/// The contact lines on everything that the maps show, except on triangles for which [`has_contact_lines`] is false.
-pub(crate) fn contact_lines(scene: &BakeScene, layout: &LightmapLayout) -> ContactLines {
-    let mut lines: Vec<(MapTexel, [DVec2; 2])> = (0..scene.triangles.len())
+/// The contact lines on everything that the maps show, except on triangles for which [`has_contact_lines`] is false; and
+/// those of them that may hide something.
+pub(crate) fn contact_lines(scene: &BakeScene, layout: &LightmapLayout) -> (ContactLines, ContactLines) {
+    let mut lines: Vec<(MapTexel, Contact)> = (0..scene.triangles.len())
         .into_par_iter()
         .flat_map_iter(|index| texels_crossed_on(scene, layout, index))
         .collect();
     // Where a mesh is as fine as its texels there are millions of lines to sort.
     if scene.stop.is_cancelled() {
-        return ContactLines::default();
+        return Default::default();
     }
     lines.par_sort_by_key(|(texel, _)| *texel);
-    ContactLines::new(lines)
+    let line = |(texel, contact): &(MapTexel, Contact)| (*texel, contact.line);
+    let hiding = lines.iter().filter(|(_, contact)| contact.may_hide).map(line).collect();
+    (ContactLines::new(lines.iter().map(line).collect()), ContactLines::new(hiding))
 }
 
 /// Those of the crossed texels that their contact lines divide, in ascending order. `open_by_place` holds the texel at
@@ -58,12 +61,8 @@ pub(crate) fn has_contact_lines(triangle: &SceneTriangle) -> bool {
     !triangle.is_hidden_duplicate && doubled_area.is_finite() && doubled_area > 2.0
 }
 
-/// The texels that contact lines on a triangle cross, each with the segment of the line in the texel's unit square.
-fn texels_crossed_on(
-    scene: &BakeScene,
-    layout: &LightmapLayout,
-    index: usize,
-) -> Vec<(MapTexel, [DVec2; 2])> {
+/// The texels that contact lines on a triangle cross, each with the part of the line in the texel's unit square.
+fn texels_crossed_on(scene: &BakeScene, layout: &LightmapLayout, index: usize) -> Vec<(MapTexel, Contact)> {
     let triangle = &scene.triangles[index];
     let map = &layout.maps[triangle.map.place()];
     if scene.stop.is_cancelled() || !has_contact_lines(triangle) {
@@ -79,9 +78,9 @@ fn texels_crossed_on(
         return Vec::new();
     }
     let mut crossed = Vec::new();
-    for segment in contacts(scene, index as u32, &frame, side as f32) {
+    for Contact { line, may_hide } in contacts(scene, index as u32, &frame, side as f32) {
         // Contacts are found in the triangle's plane; beyond the triangle's edges they do not matter.
-        let Some(segment) = clip_segment(&[p, q, r], segment) else { continue };
+        let Some(segment) = clip_segment(&[p, q, r], line) else { continue };
         let [start, end] = segment.map(|point| a + to_texels * (point - p));
         // Shorter segments come from surfaces that touch the triangle with a corner only.
         if start.distance(end) < MARGIN {
@@ -106,8 +105,8 @@ fn texels_crossed_on(
             let (x, y) = (middle.x as u32, middle.y as u32);
             if x < map.width && y < map.height {
                 let corner = DVec2::new(x.into(), y.into());
-                let segment = [pair[0], pair[1]].map(|t| start.lerp(end, t) - corner);
-                crossed.push((map.texel(x, y), segment));
+                let line = [pair[0], pair[1]].map(|t| start.lerp(end, t) - corner);
+                crossed.push((map.texel(x, y), Contact { line, may_hide }));
             }
         }
     }
@@ -153,29 +152,35 @@ fn is_divided(texel: &Texel, [from, to]: [DVec2; 2]) -> bool {
 mod tests {
     use std::sync::Arc;
 
-    use glam::{DAffine3, DVec3, Vec3};
+    use glam::{DAffine3, DVec3, Quat, Vec3};
     use lumbre_mesh::{TriangleMesh, shapes};
+    use lumbre_optics::Material;
 
     use super::*;
     use crate::scene::laid_out::laid_out;
     use crate::scene::{PlacedPrimitive, SceneObject, StaticScene};
     use crate::{BakeOptions, Density};
 
-    /// How many texels contact lines cross in a scene of meshes at these positions.
-    fn count_crossed(meshes: Vec<(TriangleMesh, DVec3)>) -> usize {
+    /// How many texels contact lines cross in a scene of meshes at these positions, and how many lines that may hide
+    /// something do.
+    fn count_crossed(meshes: Vec<(TriangleMesh, DVec3)>) -> [usize; 2] {
         let object = |(mesh, place): (TriangleMesh, DVec3)| {
             let transform = DAffine3::from_translation(place);
-            let mesh = Arc::new(mesh);
-            SceneObject::new("", vec![PlacedPrimitive { mesh, transform, ..PlacedPrimitive::default() }])
+            let material = Material { double_sided: true, ..Material::default() };
+            let primitive =
+                PlacedPrimitive { mesh: Arc::new(mesh), transform, material, ..Default::default() };
+            SceneObject::new("", vec![primitive])
         };
         let objects = meshes.into_iter().map(object).collect();
         let input = StaticScene { objects, sky: Vec3::ONE, ..StaticScene::default() }.checked().unwrap();
         let options = BakeOptions { density: Density::TexelsPerMeter(8.0), ..BakeOptions::default() };
         let (layout, scene) = laid_out(&input.objects, input.space(), &options);
-        let mut texels: Vec<MapTexel> =
-            super::contact_lines(&scene, &layout).iter().map(|(texel, _)| *texel).collect();
-        texels.dedup();
-        texels.len()
+        let (all, hiding) = super::contact_lines(&scene, &layout);
+        [all, hiding].map(|lines| {
+            let mut texels: Vec<MapTexel> = lines.iter().map(|(texel, _)| *texel).collect();
+            texels.dedup();
+            texels.len()
+        })
     }
 
     #[test]
@@ -184,11 +189,22 @@ mod tests {
         let mut room = shapes::cuboid(Vec3::new(4.0, 3.0, 4.0), 4);
         room.indices.chunks_exact_mut(3).for_each(|corners| corners.swap(1, 2));
         room.normals.iter_mut().for_each(|normal| *normal = -*normal);
-        assert_eq!(count_crossed(vec![(room.clone(), DVec3::ZERO)]), 0);
+        assert_eq!(count_crossed(vec![(room.clone(), DVec3::ZERO)]), [0, 0]);
         // A block of 1 m stands on its floor: the 4 m outline on the floor, and the 4 m along the bottoms of its sides,
         // each cross about 8 texels per metre.
         let block = shapes::cuboid(Vec3::ONE, 1);
-        let crossed = count_crossed(vec![(room, DVec3::ZERO), (block, DVec3::new(0.3, -1.0, 0.4))]);
-        assert!((56..90).contains(&crossed), "{crossed}");
+        let block = (block, DVec3::new(0.3, -1.0, 0.4));
+        let [crossed, hiding] = count_crossed(vec![(room.clone(), DVec3::ZERO), block.clone()]);
+        assert!((56..90).contains(&crossed) && hiding == crossed, "{crossed} {hiding}");
+        // Ten leaves that cross each other divide texels, but nothing is hidden beside them: only below the block.
+        let leaf = |number: usize| {
+            let turn = Quat::from_rotation_x(1.5) * Quat::from_rotation_z(0.3 * number as f32);
+            let mut leaf = shapes::plane(1.0, 1.0, 1, 1);
+            leaf.positions.iter_mut().for_each(|position| *position = turn * *position);
+            (leaf, DVec3::new(-0.8, 0.0, -0.8))
+        };
+        let meshes = [(room, DVec3::ZERO), block].into_iter().chain((0..10).map(leaf));
+        let [with_leaves, hiding] = count_crossed(meshes.collect());
+        assert!(with_leaves > 2 * crossed && hiding == crossed, "{with_leaves} {hiding}");
     }
 }

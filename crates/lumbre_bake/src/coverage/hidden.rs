@@ -57,7 +57,7 @@ const ALWAYS_EXACT: usize = 4096;
 const PASSES: [f32; 2] = [0.1, 0.2];
 
 /// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast.
-/// `contacts` divide the texels in `divided`.
+/// `contacts` are the lines beside which something may be hidden, and divide the texels in `divided`.
 pub(crate) fn remove_hidden(
     scene: &BakeScene,
     layout: &LightmapLayout,

@@ -25,8 +25,10 @@ struct BspChild(u32);
 const PIECE_FLAG: u32 = 1 << 31;
 
 /// The trees of all cells that are cut.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct BspTrees {
+    /// Most lines that cut one cell.
+    most_lines: u32,
     nodes: Vec<BspNode>,
     /// The pieces, cell by cell.
     pub pieces: Vec<SubTriangle>,
@@ -44,8 +46,8 @@ pub(crate) struct CutCell {
     pub count: u32,
 }
 
-/// Most lines that cut one cell.
-const MAX_LINES: u32 = 12;
+/// Most lines that cut one cell where there are not too many pieces.
+pub(crate) const MAX_LINES: u32 = 12;
 /// Area of the smallest piece that a contact line may cut off, as a share of its cell's.
 const MIN_PIECE: f64 = 1.0 / 256.0;
 /// A contact line cuts a piece if it is at least as long as this share of the piece's size.
@@ -75,6 +77,11 @@ struct Cell<'a> {
 }
 
 impl BspTrees {
+    /// No trees yet; cells will be cut along so many lines at most.
+    pub fn new(most_lines: u32) -> Self {
+        Self { most_lines, nodes: Vec::new(), pieces: Vec::new(), full: 0 }
+    }
+
     /// Cuts a cell, counter-clockwise in its plane's frame, along segments. `weights` converts places in the frame to
     /// barycentric weights. The first piece takes the slot `cell_slot`, the others those from `free_slot` on. `None` if
     /// no segment cuts it.
@@ -87,7 +94,7 @@ impl BspTrees {
     ) -> Option<CutCell> {
         let smallest = MIN_PIECE * area(&corners);
         let (root, first) = (self.nodes.len() as u32, self.pieces.len() as u32);
-        let (slots, lines_left) = ((cell_slot, free_slot), MAX_LINES);
+        let (slots, lines_left) = ((cell_slot, free_slot), self.most_lines);
         let mut cell = Cell { trees: self, weights, first, slots, smallest, lines_left, full: false };
         let line = cell.best_line(&corners, segments)?;
         cell.divide(&corners, segments, Some(line));
@@ -278,7 +285,7 @@ mod tests {
     }
 
     fn cut(segments: &[[DVec2; 2]]) -> (BspTrees, Option<CutCell>) {
-        let mut trees = BspTrees::default();
+        let mut trees = BspTrees::new(MAX_LINES);
         let weights = DMat2::from_diagonal(DVec2::splat(0.5));
         let cell = trees.cut(CELL, segments, weights, (7, 100));
         (trees, cell)
@@ -345,7 +352,7 @@ mod tests {
         let other = segment([0.005634784698486328, 0.03208932280540466], [0.015625, 0.0234375]);
         let weights = DMat2::from_diagonal(DVec2::splat(25.6));
         for segments in [vec![foot, other], vec![other, foot], vec![foot], vec![other]] {
-            let mut trees = BspTrees::default();
+            let mut trees = BspTrees::new(MAX_LINES);
             if trees.cut(corners, &segments, weights, (0, 1)).is_none() {
                 continue;
             }

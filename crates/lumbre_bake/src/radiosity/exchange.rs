@@ -68,7 +68,7 @@ impl Exchange {
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<ExchangeResult, BakeError> {
         let mut report = ExchangeReport::of(&transport);
-        let Transport { patches, side, factors, halves } = transport;
+        let Transport { patches, factors, halves } = transport;
         let open = factors.open.as_slice();
         let (direct_halves, rays) = direct_halves(sources, &patches, open, known_direct, options, monitor)?;
         let mut notes = StageNotes::of_rays(rays);
@@ -94,17 +94,17 @@ impl Exchange {
             let first = direct.iter().zip(&sky).map(arriving).collect();
             let system =
                 MeanSystem { solver: options.solver, reflectance: mean_reflectances(&patches.list), first };
-            size_error(sources.scene, &patches, side, &factors, &system)
+            size_error(sources.scene, &patches, &factors, &system)
         })?;
         let reflected =
             |(index, patch): (usize, &Patch)| patch.reflectance * (direct[index] + indirect[index]);
         let exitance: Vec<Vec3> = patches.list.iter().enumerate().map(reflected).collect();
         let guide = monitor.run_interruptible(0.8, || {
             let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
-            SamplingGuide::new(sources.scene, &patches, side, &factors, &radiosity, &sky)
+            SamplingGuide::new(sources.scene, &patches, &factors, &radiosity, &sky)
         })?;
         let exchange = Self {
-            min_read_distance: patches.min_read_distances(sources.scene, side),
+            min_read_distance: patches.min_read_distances(sources.scene),
             patches,
             direct,
             indirect,
@@ -129,15 +129,15 @@ impl Exchange {
         if !has_sky {
             return ((None, report), notes);
         }
-        let Transport { patches, side, factors, .. } = transport;
+        let Transport { patches, factors, .. } = transport;
         let count = patches.list.len();
         let dark = vec![Vec3::ZERO; count];
-        let guide = SamplingGuide::new(sources.scene, &patches, side, &factors, &vec![0.0; count], &dark);
+        let guide = SamplingGuide::new(sources.scene, &patches, &factors, &vec![0.0; count], &dark);
         let exchange = Self {
             direct: dark.clone(),
             indirect: dark.clone(),
             indirect_error: vec![Vec2::ZERO; count],
-            min_read_distance: patches.min_read_distances(sources.scene, side),
+            min_read_distance: patches.min_read_distances(sources.scene),
             patches,
             guide: Arc::new(guide),
             exitance: dark,

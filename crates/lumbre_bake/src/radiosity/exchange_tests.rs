@@ -12,7 +12,7 @@ use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light};
 
 use super::exchange::{Exchange, ExchangeReport};
-use super::face_clusters::JoinableFaces;
+use super::subdivision::Subdivision;
 use super::transport::{PatchResolution, Transport};
 use crate::monitor::BakeMonitor;
 use crate::options::Solver;
@@ -67,8 +67,7 @@ fn exchanged(
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let patch_side = (2.0 * area / patches).sqrt();
     let resolution = PatchResolution {
-        patch_side,
-        joinable: Arc::new(JoinableFaces::new(scene, patch_side)),
+        subdivision: Subdivision::new(scene, patch_side),
         texture_points: 64,
         form_factor_rays,
         memory_bytes: 0,

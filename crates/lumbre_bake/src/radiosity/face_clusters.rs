@@ -373,7 +373,7 @@ mod tests {
     fn checked_patches(scene: &BakeScene, side: f32) -> Patches {
         let side = side * scene.space.scale as f32;
         let patches = patches_of(scene, side);
-        assert_eq!(patches.list.len() as u64, Patches::count(scene, &patches.joinable, side));
+        assert_eq!(Some(patches.list.len() as u64), Patches::count(scene, &patches.subdivision, u64::MAX));
         let area = |areas: &mut dyn Iterator<Item = f32>| areas.map(f64::from).sum::<f64>();
         let covered = area(&mut patches.list.iter().map(|patch| patch.area));
         let expected = area(&mut scene.triangles.iter().map(|triangle| triangle.area));

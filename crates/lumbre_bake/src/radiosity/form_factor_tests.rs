@@ -6,10 +6,10 @@ use std::sync::Arc;
 use glam::Vec3;
 use lumbre_mesh::TriangleMesh;
 
-use super::face_clusters::JoinableFaces;
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
+use super::subdivision::Subdivision;
 use crate::monitor::{BakeMonitor, Progress};
 use crate::options::FormFactorMethod;
 use crate::scene::laid_out::laid_out;
@@ -46,7 +46,7 @@ pub(crate) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
 
 /// The patches of a scene, of about `side` canonical units.
 pub(crate) fn patches_of(scene: &BakeScene, side: f32) -> Patches {
-    Patches::new(scene, &Arc::new(JoinableFaces::new(scene, side)), side, 64)
+    Patches::new(scene, &Subdivision::new(scene, side), 64)
 }
 
 const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines];

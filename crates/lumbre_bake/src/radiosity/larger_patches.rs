@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::form_factors::FormFactors;
 use super::patch_index::{PatchIndex, RegionIndex};
 use super::patches::Patches;
+use super::subdivision::Subdivision;
 use crate::scene::BakeScene;
 
 /// The larger patches, which are regions of the smaller ones.
@@ -20,7 +21,7 @@ pub(crate) struct LargerPatches {
 impl LargerPatches {
     /// Patches of about `side` canonical units; `None` if the bake was cancelled.
     pub fn new(scene: &BakeScene, smaller: &Patches, side: f32) -> Option<Self> {
-        let patches = Patches::outlines(scene, &smaller.joinable, side);
+        let patches = Patches::outlines(scene, &Subdivision { side, ..smaller.subdivision.clone() });
         if scene.stop.is_cancelled() {
             return None;
         }

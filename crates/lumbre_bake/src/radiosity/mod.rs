@@ -27,15 +27,16 @@ pub(crate) mod solution;
 pub(crate) mod solver;
 mod sparse_distributions;
 pub(crate) mod stationary;
+mod subdivision;
 pub(crate) mod transport;
 mod triangle_cells;
 mod unseen_regions;
 
 pub(crate) use exchange::{Exchange, ExchangeReport};
-pub(crate) use face_clusters::JoinableFaces;
 pub(crate) use form_factors::FormFactors;
 pub(crate) use patch_index::{PatchIndex, RegionIndex};
 pub(crate) use patches::{Patch, Patches};
 pub(crate) use sampling_guide::{Discovery, GuidedPatch, SamplingGuide};
 pub(crate) use sparse_distributions::RowPart;
+pub(crate) use subdivision::Subdivision;
 pub(crate) use transport::{PatchResolution, Transport};

@@ -19,7 +19,7 @@ use crate::scene::{BakeScene, Side};
 fn check(objects: &[&[[Vec3; 3]]], side: f32, side_of_line: impl Fn(Vec3) -> u32) {
     let scene = scene(objects);
     let patches = patches_of(&scene, side);
-    assert_eq!(patches.list.len() as u64, Patches::count(&scene, &patches.joinable, side));
+    assert_eq!(Some(patches.list.len() as u64), Patches::count(&scene, &patches.subdivision, u64::MAX));
     let area: f32 = patches.list.iter().map(|patch| patch.area).sum();
     let expected: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     assert!((area / expected - 1.0).abs() < 1e-5, "{area} {expected}");

@@ -5,14 +5,15 @@
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::bsp::BspTrees;
-use super::face_clusters::{FaceClusters, JoinableFaces};
+use super::face_clusters::FaceClusters;
 use super::patch_index::PatchIndex;
+use super::subdivision::Subdivision;
 use super::triangle_cells::{CORNERS, TriangleCells, cell_area, cell_at, point_in_row, row_of_cell};
 use crate::sampling::triangle_point;
 use crate::scene::mean_of_points::{SubTriangle, mean_of_points};
@@ -80,8 +81,7 @@ pub(crate) struct Patches {
     roots: Vec<u32>,
     trees: BspTrees,
     clusters: FaceClusters,
-    /// The triangles that may share a patch.
-    pub joinable: Arc<JoinableFaces>,
+    pub subdivision: Subdivision,
     /// Where patches are coarser than they should be, for the report.
     pub warnings: Vec<String>,
 }
@@ -114,40 +114,46 @@ impl Patches {
         if area > 0.0 { (sum / area).clamp(0.0, 0.999) } else { 0.0 }
     }
 
-    /// How many patches [`Patches::new`] would make, without the memory that they take.
-    pub fn count(scene: &BakeScene, joinable: &JoinableFaces, side: f32) -> u64 {
-        let mut trees = BspTrees::default();
-        let clusters = FaceClusters::new(scene, joinable, side);
+    /// How many patches [`Patches::new`] would make, without the memory that they take. `None` if cutting cells adds more
+    /// than `most_pieces`.
+    pub fn count(scene: &BakeScene, subdivision: &Subdivision, most_pieces: u64) -> Option<u64> {
+        let clusters = FaceClusters::new(scene, &subdivision.joinable, subdivision.side);
         let sides = |index: usize| 1 + u64::from(scene.triangles[index].two_sided);
         let of_clusters: u64 =
             (0..clusters.len()).map(|cluster| sides(clusters.faces(cluster)[0] as usize)).sum();
         let is_alone = |&index: &usize| {
-            !scene.triangles[index].is_hidden_duplicate && clusters.of(index as u32).is_none()
+            let triangle = &scene.triangles[index];
+            !triangle.is_hidden_duplicate && clusters.of(index as u32).is_none() && !scene.stop.is_cancelled()
         };
-        let alone = (0..scene.triangles.len()).filter(is_alone).take_while(|_| !scene.stop.is_cancelled());
+        let pieces = AtomicU64::new(0);
         let of_triangle = |index: usize| {
-            TriangleCells::new(scene, index, side, &mut trees).patches_per_side() * sides(index)
+            let mut trees = BspTrees::new(subdivision.most_lines);
+            let cells = TriangleCells::new(scene, index, subdivision.side, &mut trees);
+            let added = sides(index) * cells.added_by_cuts();
+            // Whether there are too many does not depend on the order in which they are counted.
+            let is_within = pieces.fetch_add(added, Ordering::Relaxed) + added <= most_pieces;
+            is_within.then_some(sides(index) * cells.patches_per_side())
         };
-        of_clusters + alone.map(of_triangle).sum::<u64>()
+        let alone = (0..scene.triangles.len()).into_par_iter().filter(is_alone).map(of_triangle);
+        Some(of_clusters + alone.try_reduce(|| 0, |a, b| Some(a + b))?)
     }
 
-    /// Divides all surfaces into patches of about `side` canonical units. Those of `joinable` triangles may be clusters.
-    /// Textures are averaged from up to `texture_points` along the edge of a patch.
-    pub fn new(scene: &BakeScene, joinable: &Arc<JoinableFaces>, side: f32, texture_points: u32) -> Self {
-        let mut patches = Self::outlines(scene, joinable, side);
-        patches.find_reflectances(scene, side, texture_points);
+    /// Divides all surfaces into patches. Textures are averaged from up to `texture_points` along the edge of a patch.
+    pub fn new(scene: &BakeScene, subdivision: &Subdivision, texture_points: u32) -> Self {
+        let mut patches = Self::outlines(scene, subdivision);
+        patches.find_reflectances(scene, texture_points);
         patches
     }
 
     /// As [`Patches::new`], but without reflectances: all of them are 0.
-    pub fn outlines(scene: &BakeScene, joinable: &Arc<JoinableFaces>, side: f32) -> Self {
+    pub fn outlines(scene: &BakeScene, subdivision: &Subdivision) -> Self {
         let mut patches = Self {
             list: Vec::new(),
             triangles: Vec::with_capacity(scene.triangles.len()),
             roots: Vec::new(),
-            trees: BspTrees::default(),
-            clusters: FaceClusters::new(scene, joinable, side),
-            joinable: Arc::clone(joinable),
+            trees: BspTrees::new(subdivision.most_lines),
+            clusters: FaceClusters::new(scene, &subdivision.joinable, subdivision.side),
+            subdivision: subdivision.clone(),
             warnings: Vec::new(),
         };
         // Per cluster, its patches, once its first triangle has been visited.
@@ -166,7 +172,7 @@ impl Patches {
                 continue;
             }
             let full_before = patches.trees.full;
-            let cells = TriangleCells::new(scene, index, side, &mut patches.trees);
+            let cells = TriangleCells::new(scene, index, subdivision.side, &mut patches.trees);
             if patches.trees.full > full_before {
                 *full_cells.entry(triangle.map).or_default() += patches.trees.full - full_before;
             }
@@ -179,7 +185,10 @@ impl Patches {
                 scene.names[map.place()]
             )
         };
-        patches.warnings = full_cells.into_iter().map(warning).collect();
+        // Where cells are cut along few lines, that was decided for the whole scene, with a warning for all of it.
+        if !subdivision.has_few_lines() {
+            patches.warnings = full_cells.into_iter().map(warning).collect();
+        }
         patches
     }
 
@@ -260,7 +269,8 @@ impl Patches {
     }
 
     /// Finds what each patch reflects, and warns of textures that are too fine for the patches.
-    fn find_reflectances(&mut self, scene: &BakeScene, side: f32, texture_points: u32) {
+    fn find_reflectances(&mut self, scene: &BakeScene, texture_points: u32) {
+        let of_cell = cell_area(self.subdivision.side);
         let of_patch = |patch: &Patch| {
             let triangle = &scene.triangles[patch.triangle as usize];
             let surface = &scene.surfaces[triangle.surface as usize];
@@ -275,7 +285,7 @@ impl Patches {
                 // By rounding, the share of a very small piece may be 0.
                 let share = f64::from(area_share(&corners).max(f32::MIN_POSITIVE));
                 let area_of_piece = share * f64::from(scene.triangles[triangle as usize].area);
-                let share_of_cell = area_of_piece as f32 / cell_area(side);
+                let share_of_cell = area_of_piece as f32 / of_cell;
                 let most_points = most_texture_points(texture_points, share_of_cell);
                 let piece = (triangle as usize, patch.side, corners);
                 let (reflectance, texels) = mean_reflectance(scene, piece, most_points);
@@ -395,8 +405,8 @@ impl Patches {
     }
 
     /// Per patch, the distance below which it is too coarse to be treated as uniformly bright, canonical units: twice
-    /// the length of its side, which is at most `side`.
-    pub fn min_read_distances(&self, scene: &BakeScene, side: f32) -> Vec<f32> {
+    /// the length of its side.
+    pub fn min_read_distances(&self, scene: &BakeScene) -> Vec<f32> {
         let of_patch = |patch: &Patch| {
             let longest_edge = |[a, b, c]: [Vec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
             let diameter = match self.cluster(patch) {
@@ -409,7 +419,7 @@ impl Patches {
                 }
             };
             // The longest edge of half a square is the square's diagonal.
-            NEAR_SIDES * side.min(diameter * FRAC_1_SQRT_2)
+            NEAR_SIDES * self.subdivision.side.min(diameter * FRAC_1_SQRT_2)
         };
         self.list.iter().map(of_patch).collect()
     }

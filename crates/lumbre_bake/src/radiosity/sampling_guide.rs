@@ -89,17 +89,16 @@ const REGION_SIDE: f32 = 4.0;
 const MIN_RADIOSITY: f64 = 0.1;
 
 impl SamplingGuide {
-    /// From the patches (of `side` canonical units), their form factors, the radiosity of each and its irradiance by
+    /// From the patches, their form factors, the radiosity of each and its irradiance by
     /// the sky (W/m²).
     pub fn new(
         scene: &BakeScene,
         patches: &Patches,
-        side: f32,
         factors: &FormFactors,
         radiosity: &[f32],
         sky: &[Vec3],
     ) -> Self {
-        let Some(larger) = LargerPatches::new(scene, patches, REGION_SIDE * side) else {
+        let Some(larger) = LargerPatches::new(scene, patches, REGION_SIDE * patches.subdivision.side) else {
             return Self::empty();
         };
         let area = |member: &PatchIndex| f64::from(patches.list[member.place()].area);
@@ -112,7 +111,7 @@ impl SamplingGuide {
                 members.iter().map(power).sum::<f64>() / total
             })
             .collect();
-        let unseen = UnseenRegions::new(scene, &larger, REGION_SIDE * side, &radiosity_of_regions);
+        let unseen = UnseenRegions::new(scene, &larger, &radiosity_of_regions);
         let share_and_row = |members: &[PatchIndex], exchange: Vec<(RegionIndex, f64)>| {
             let mut flux: Vec<(RegionIndex, f64)> = exchange
                 .iter()

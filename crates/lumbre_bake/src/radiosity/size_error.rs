@@ -27,16 +27,15 @@ pub(crate) struct MeanSystem {
     pub first: Vec<f64>,
 }
 
-/// The signed error of each patch's irradiance by bounces; `side` is that of `patches`.
+/// The signed error of each patch's irradiance by bounces.
 pub(crate) fn size_error(
     scene: &BakeScene,
     patches: &Patches,
-    side: f32,
     factors: &FormFactors,
     system: &MeanSystem,
 ) -> Vec<f32> {
     let MeanSystem { solver, reflectance, first } = system;
-    let Some(larger) = LargerPatches::new(scene, patches, COARSER * side) else {
+    let Some(larger) = LargerPatches::new(scene, patches, COARSER * patches.subdivision.side) else {
         return vec![0.0; patches.list.len()];
     };
     let emission: Vec<f64> = reflectance.iter().zip(first).map(|(rho, light)| rho * light).collect();

@@ -1,13 +1,11 @@
 //! How light is transported between the surfaces of a scene, whatever the light: patches, and the form factors between
 //! them. The light of the patches is found in `exchange`.
 
-use std::sync::Arc;
-
 use glam::Vec3;
 
-use super::face_clusters::JoinableFaces;
 use super::form_factors::FormFactors;
 use super::patches::Patches;
+use super::subdivision::Subdivision;
 use crate::monitor::BakeMonitor;
 use crate::report::StageNotes;
 use crate::scene::BakeScene;
@@ -16,10 +14,7 @@ use crate::{BakeError, BakeOptions};
 /// How finely the exchange of light is computed.
 #[derive(Clone, Debug)]
 pub(crate) struct PatchResolution {
-    /// Side of a patch, canonical units.
-    pub patch_side: f32,
-    /// The triangles that may share a patch.
-    pub joinable: Arc<JoinableFaces>,
+    pub subdivision: Subdivision,
     /// Most points along a patch's edge at which textures are averaged.
     pub texture_points: u32,
     /// Rays for all form factors together.
@@ -31,8 +26,6 @@ pub(crate) struct PatchResolution {
 /// The patches of a scene and the form factors between them.
 pub(crate) struct Transport {
     pub patches: Patches,
-    /// Side of a patch, canonical units.
-    pub side: f32,
     /// By all rays, and by two independent halves of them.
     pub factors: FormFactors,
     pub halves: [FormFactors; 2],
@@ -46,9 +39,8 @@ impl Transport {
         options: &BakeOptions,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(Self, StageNotes), BakeError> {
-        let side = resolution.patch_side;
         let patches = monitor.run_interruptible(0.0, || {
-            Patches::new(scene, &resolution.joinable, side, resolution.texture_points)
+            Patches::new(scene, &resolution.subdivision, resolution.texture_points)
         })?;
         let (factors, halves) = match is_black(&patches) {
             true => (FormFactors::none(&patches), [FormFactors::default(), FormFactors::default()]),
@@ -59,7 +51,7 @@ impl Transport {
         };
         let (warnings, rays) = (patches.warnings.clone(), factors.rays);
         let notes = StageNotes { warnings, rays, ..StageNotes::default() };
-        Ok((Self { patches, side, factors, halves }, notes))
+        Ok((Self { patches, factors, halves }, notes))
     }
 
     /// Whether no surface reflects anything.

@@ -35,8 +35,12 @@ impl TriangleCells {
 
     /// Number of patches on one side of the triangle.
     pub fn patches_per_side(&self) -> u64 {
-        let added: u64 = self.cut.iter().map(|(_, cut)| u64::from(cut.count - 1)).sum();
-        u64::from(self.divisions).pow(2) + added
+        u64::from(self.divisions).pow(2) + self.added_by_cuts()
+    }
+
+    /// How many of these there are because cells are cut.
+    pub fn added_by_cuts(&self) -> u64 {
+        self.cut.iter().map(|(_, cut)| u64::from(cut.count - 1)).sum()
     }
 }
 
@@ -82,7 +86,8 @@ fn cut_cells(
         return Vec::new();
     }
     let frame = PlaneFrame::new(triangle);
-    let segments = contacts(scene, index as u32, &frame, side);
+    let segments: Vec<[DVec2; 2]> =
+        contacts(scene, index as u32, &frame, side).into_iter().map(|contact| contact.line).collect();
     let [a, b, c] = triangle.corners.map(|corner| frame.flat(corner.as_dvec3()));
     let weights = DMat2::from_cols(b - a, c - a).inverse();
     if segments.is_empty() || !weights.is_finite() {

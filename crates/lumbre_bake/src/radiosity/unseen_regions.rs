@@ -41,8 +41,9 @@ struct Cube {
 }
 
 impl UnseenRegions {
-    /// From regions of about `side` canonical units, and the radiosity of each.
-    pub fn new(scene: &BakeScene, regions: &LargerPatches, side: f32, radiosity: &[f64]) -> Self {
+    /// From regions and the radiosity of each.
+    pub fn new(scene: &BakeScene, regions: &LargerPatches, radiosity: &[f64]) -> Self {
+        let side = regions.patches.subdivision.side;
         let mut numbers: BTreeMap<[i32; 3], u32> = BTreeMap::new();
         let mut unseen = Self { places: Vec::new(), cube_of: Vec::new(), cubes: Vec::new() };
         for (region, radiosity) in RegionIndex::all(radiosity.len()).zip(radiosity) {

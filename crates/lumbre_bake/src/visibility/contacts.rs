@@ -38,6 +38,16 @@ impl PlaneFrame {
     }
 }
 
+/// A contact line on a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Contact {
+    /// Its ends, in the frame of the triangle's plane.
+    pub line: [DVec2; 2],
+    /// Whether the surface on one side of it may be hidden: under something that lies there, or inside a solid. A sheet
+    /// that stands there hides nothing, as light reaches both of its sides.
+    pub may_hide: bool,
+}
+
 /// Height above a patch, as a fraction of the patch's side, up to which a surface counts as standing or lying on it.
 pub(crate) const REACH: f64 = 0.1;
 /// Height at which a surface that stands on a triangle is intersected, as a fraction of the reach: above the rounding
@@ -46,9 +56,9 @@ const LEVEL: f64 = 1.0 / 64.0;
 /// Cosine between the normals of two surfaces above which one lies on the other instead of standing on it.
 const LYING: f64 = 0.98;
 
-/// The contact lines of other triangles on triangle `index`, as segments in `frame`, the frame of its plane. `side` is
-/// the side of a patch. Adjacent triangles of a mesh, which share an edge, make no contact.
-pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: f32) -> Vec<[DVec2; 2]> {
+/// The contact lines of other triangles on triangle `index`, in `frame`, the frame of its plane. `side` is the side of a
+/// patch. Adjacent triangles of a mesh, which share an edge, make no contact.
+pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: f32) -> Vec<Contact> {
     let triangle = &scene.triangles[index as usize];
     let reach = REACH * f64::from(side);
     let Bounds::<Vec3> { low, high } = triangle.corners.into_iter().collect();
@@ -65,7 +75,10 @@ pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: 
         if cosine.abs() <= LYING {
             // A triangle that shares an edge with it stands beside it and not on it.
             if common_corners(&triangle.corners, &other_triangle.corners) < 2 {
-                lines.extend(contact(frame, &corners, reach, triangle.two_sided));
+                let line = contact(frame, &corners, reach, triangle.two_sided);
+                // Beyond a sheet there may still be the dark outside of a room.
+                let may_hide = !other_triangle.two_sided || scene.dark_outside;
+                lines.extend(line.map(|line| Contact { line, may_hide }));
             }
         } else if lies_on(frame, &corners, reach, cosine, triangle.two_sided) {
             for i in 0..3 {
@@ -81,7 +94,7 @@ pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: 
     });
     let mut outlines: Vec<_> = outlines.into_iter().filter_map(|(ends, line)| Some((ends, line?))).collect();
     outlines.sort_unstable_by_key(|(ends, _)| *ends);
-    lines.extend(outlines.into_iter().map(|(_, line)| line));
+    lines.extend(outlines.into_iter().map(|(_, line)| Contact { line, may_hide: true }));
     lines
 }
 
