@@ -36,18 +36,23 @@ impl ContactLines {
     pub fn separate(&self, map: &MapLayout, [from, to]: [Vec2; 2]) -> bool {
         let (low, high) = (from.min(to).max(Vec2::ZERO).as_uvec2(), from.max(to).max(Vec2::ZERO).as_uvec2());
         (low.y..=high.y.min(map.height - 1)).any(|y| {
-            (low.x..=high.x.min(map.width - 1)).any(|x| {
-                let corner = DVec2::new(f64::from(x), f64::from(y));
-                let segment = [from, to].map(|place| place.as_dvec2() - corner);
-                self.in_texel(map.texel(x, y)).any(|line| cross(line, segment))
+            let (first, last) = (map.texel(low.x, y), map.texel(high.x.min(map.width - 1), y));
+            self.in_row(first, last).any(|&(texel, line)| {
+                let corner = DVec2::new(f64::from(low.x + texel.0 - first.0), f64::from(y));
+                cross(line, [from, to].map(|place| place.as_dvec2() - corner))
             })
         })
     }
 
     /// The lines in a texel, each as a segment in its unit square.
     pub fn in_texel(&self, texel: MapTexel) -> impl Iterator<Item = [DVec2; 2]> {
-        let first = self.0.partition_point(|(other, _)| *other < texel);
-        self.0[first..].iter().take_while(move |(other, _)| *other == texel).map(|(_, line)| *line)
+        self.in_row(texel, texel).map(|(_, line)| *line)
+    }
+
+    /// The lines in the texels of a row of a map, from the first to the last.
+    fn in_row(&self, first: MapTexel, last: MapTexel) -> impl Iterator<Item = &(MapTexel, [DVec2; 2])> {
+        let start = self.0.partition_point(|(texel, _)| *texel < first);
+        self.0[start..].iter().take_while(move |(texel, _)| *texel <= last)
     }
 }
 

@@ -9,6 +9,7 @@ pub(crate) mod footprint;
 pub(crate) mod hidden;
 #[cfg(test)]
 pub(crate) mod on_a_floor;
+pub(crate) mod representatives;
 pub(crate) mod texel_geometry;
 pub(crate) mod texel_groups;
 pub(crate) mod tile_sequence;
@@ -16,5 +17,6 @@ pub(crate) mod tile_sequence;
 pub(crate) use contact_lines::ContactLines;
 pub(crate) use covered_texels::CoveredTexels;
 pub(crate) use footprint::{Footprint, FootprintPoint, GRID, MapAxes, Texel, barycentric, receiver};
+pub(crate) use representatives::Representatives;
 pub(crate) use texel_groups::TexelGroups;
 pub(crate) use tile_sequence::TileSequence;

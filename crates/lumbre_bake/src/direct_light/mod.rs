@@ -13,6 +13,7 @@ pub(crate) mod local_light;
 pub(crate) mod shafts;
 pub(crate) mod shared_light;
 mod source_sampler;
+mod sparse_pass;
 pub(crate) mod views;
 
 pub(crate) use local_light::LocalLight;

@@ -11,10 +11,11 @@ use super::control_variates::{control_cost, mean_controlled_light, variance_left
 use super::error_goals::ErrorGoals;
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
+use super::sparse_pass::{SparsePass, sparse_pass};
 use super::views::ErrorsInViews;
-use crate::chunks::{decide, in_chunks, in_chunks_until_deadline};
-use crate::coverage::{Texel, TileSequence, receiver};
-use crate::denoise::replicates::mean;
+use crate::chunks::{decide, in_chunks_until_deadline};
+use crate::coverage::{Representatives, Texel, TileSequence, receiver};
+use crate::denoise::replicates::{mean, variance};
 use crate::denoise::{Denoised, Estimates, Nearness, Neighbourhoods, REPLICATES};
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::{
@@ -83,6 +84,30 @@ impl SampleSums {
     }
 }
 
+/// The sums of a texel that was not sampled, from texels around it; and by how much their light differs, as the squared
+/// length of its channels, beyond what is noise.
+fn interpolated(sums: &[SampleSums], around: &[(CoveredTexel, f32)]) -> (SampleSums, f64) {
+    let mut sum = SampleSums::default();
+    for (other, weight) in around {
+        let other = &sums[other.place()];
+        for replicate in 0..REPLICATES {
+            sum.sums[replicate] += *weight * other.sums[replicate];
+            sum.controls[replicate] += weight * other.controls[replicate];
+            sum.visible_controls[replicate] += weight * other.visible_controls[replicate];
+        }
+        sum.mixed += *weight * other.mixed;
+        sum.inverse_distances += weight * other.inverse_distances;
+        sum.samples = other.samples;
+    }
+    let light = mean(&sum.estimates());
+    let difference = |(other, weight): &(CoveredTexel, f32)| {
+        let estimates = sums[other.place()].estimates();
+        let noise = (1.0 - weight) * variance(&estimates).element_sum();
+        f64::from(weight * ((mean(&estimates) - light).length_squared() - noise))
+    };
+    (sum, around.iter().map(difference).sum())
+}
+
 /// The sums of all texels, with what is needed to sample and smooth more.
 pub(crate) struct SharedLight<'a> {
     sources: &'a Sources<'a>,
@@ -95,6 +120,8 @@ pub(crate) struct SharedLight<'a> {
     most: u32,
     /// Per covered texel.
     sums: Vec<SampleSums>,
+    /// Per covered texel, the squared error, relative to the light, of its having been interpolated; empty if none was.
+    interpolation_errors: Vec<f32>,
     /// The smoothed light of `sums`; updated after every round.
     smoothed: Denoised,
 }
@@ -111,21 +138,42 @@ impl<'a> SharedLight<'a> {
     ) -> Result<Self, BakeError> {
         let texels = &neighbourhoods.texels.list;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
-        let (sums, smoothed) = (Vec::new(), Denoised::default());
-        let mut light = Self { sources, texels, cuts, neighbourhoods, options, first, most, sums, smoothed };
-        // A complete map comes first, whatever time it takes; if time is limited, with a single sample.
+        let mut light = Self {
+            sources,
+            texels,
+            cuts,
+            neighbourhoods,
+            options,
+            first,
+            most,
+            sums: Vec::new(),
+            interpolation_errors: Vec::new(),
+            smoothed: Denoised::default(),
+        };
+        // A complete map comes first; if time is limited, with a single sample, and perhaps interpolated.
         let begun = monitor.seconds();
         let few = if options.time.is_some() { 1 } else { first };
-        light.sums = in_chunks(texels.len(), monitor, |place| {
-            let mut sums = SampleSums::default();
-            if is_wanted(place) {
-                light.add(place, &mut sums, few);
-            }
-            sums
-        })?;
+        let is_sampled = |texel: &CoveredTexel| {
+            is_wanted(texel.place())
+                && !texels[texel.place()].is_hidden()
+                && !cuts.of(*texel).shared.is_empty()
+        };
+        let wanted: Vec<CoveredTexel> = CoveredTexel::all(texels.len()).filter(is_sampled).collect();
+        let SparsePass { sampled, blocks } =
+            sparse_pass(light.neighbourhoods.texels, &wanted, PASS, monitor, |texel| {
+                let mut sums = SampleSums::default();
+                light.add(texel.place(), &mut sums, few);
+                sums
+            })?;
+        light.sums = vec![SampleSums::default(); texels.len()];
+        for (texel, sums) in sampled {
+            light.sums[texel.place()] = sums;
+        }
         let samples = monitor.clock().affordable(few, first, monitor.seconds() - begun);
         let samples = decide(monitor, samples)?;
-        if samples > few {
+        if let Some(blocks) = blocks {
+            monitor.run_interruptible(1.0, || light.interpolate(&wanted, &blocks))?;
+        } else if samples > few {
             let more = in_chunks_until_deadline(texels.len(), monitor, |place| {
                 let mut sums = light.sums[place];
                 if is_wanted(place) {
@@ -137,6 +185,34 @@ impl<'a> SharedLight<'a> {
         }
         light.smoothed = light.smooth(monitor)?;
         Ok(light)
+    }
+
+    /// Interpolates the sums of those of the `wanted` texels that have none, and notes how uncertain that is.
+    fn interpolate(&mut self, wanted: &[CoveredTexel], blocks: &Representatives<'_>) {
+        let keys = self.cuts.keys();
+        let (known, missing): (Vec<CoveredTexel>, Vec<CoveredTexel>) =
+            wanted.iter().partition(|texel| self.sums[texel.place()].samples > 0);
+        if known.is_empty() {
+            return;
+        }
+        let interpolate = |texel: &CoveredTexel| {
+            let fits = |other: CoveredTexel| {
+                keys[other.place()] == keys[texel.place()] && self.sums[other.place()].samples > 0
+            };
+            interpolated(&self.sums, &blocks.around(*texel, fits))
+        };
+        let sums: Vec<(SampleSums, f64)> = missing.par_iter().map(interpolate).collect();
+        let light = |sums: &SampleSums| f64::from(mean(&sums.estimates()).length_squared());
+        let (mut squared_differences, mut squared_light) = (0.0, 0.0);
+        for (texel, (sums, differences)) in missing.iter().zip(sums) {
+            squared_differences += differences;
+            squared_light += light(&sums);
+            self.sums[texel.place()] = sums;
+        }
+        let relative = squared_differences.max(0.0) / squared_light;
+        let relative = if relative.is_finite() { relative.min(1.0) as f32 } else { 1.0 };
+        self.interpolation_errors = vec![0.0; self.sums.len()];
+        missing.iter().for_each(|texel| self.interpolation_errors[texel.place()] = relative);
     }
 
     /// Adds samples to the sums of a texel until each replicate has `samples`.
@@ -329,10 +405,13 @@ impl<'a> SharedLight<'a> {
     /// Adds the smoothed light to that of the individually sampled sources.
     pub fn add_to(self, direct: &mut [Direct]) {
         let (variances, Denoised { estimates, .. }) = (self.smoothed.errors(), self.smoothed);
+        let interpolation_error = |place: usize| self.interpolation_errors.get(place).copied().unwrap_or(0.0);
         for (place, (direct, sums)) in direct.iter_mut().zip(&self.sums).enumerate() {
             if sums.samples > 0 {
                 let (estimates, variance) = (&estimates[place], variances.cautious[place]);
-                direct.baked += mean(estimates).max(Vec3::ZERO);
+                let light = mean(estimates).max(Vec3::ZERO);
+                direct.baked += light;
+                direct.variance += interpolation_error(place) * light.length_squared() / 3.0;
                 direct.mixed += sums.mixed / (sums.samples * REPLICATES as u32) as f32;
                 direct.variance += variance;
                 direct.caution += variance - variances.expected[place];

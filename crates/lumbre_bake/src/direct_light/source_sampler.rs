@@ -3,10 +3,14 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use glam::Vec3;
+use rayon::prelude::*;
+
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
 use super::shafts::Shafts;
 use super::shared_light::SharedLight;
+use super::sparse_pass::{SparsePass, sparse_pass};
 use super::views::ErrorsInViews;
 use crate::chunks::{decide, in_chunks};
 use crate::coverage::{CoveredTexels, Texel, receiver};
@@ -121,32 +125,58 @@ impl<'a> SourceSampler<'a> {
         })
     }
 
-    /// Known light, and a few samples of every other texel: a complete map, whatever time it takes.
+    /// Known light, and a few samples of every other texel, or of so many that there is time for: the others are
+    /// interpolated.
     pub fn first_pass(&self, monitor: &mut BakeMonitor<'_>) -> Result<IndividualLight, BakeError> {
         let unknown: Vec<CoveredTexel> = self.unknown().collect();
         let [usual, ..] = self.options.effort().direct;
         let is_time_short = decide(monitor, monitor.clock().is_past(SHORT_OF_TIME))?;
         let few = if is_time_short { usual.min(LATE_SAMPLES) } else { usual };
-        let sampled = self.few_samples(&unknown, few, monitor)?;
+        let clock = monitor.clock();
+        let SparsePass { sampled, blocks } = sparse_pass(self.texels, &unknown, PASS, monitor, |texel| {
+            self.light(texel, if clock.is_over() { few.min(LATE_SAMPLES) } else { few })
+        })?;
         let count = self.texels.list.len();
         let mut direct: Vec<Direct> = CoveredTexel::all(count)
             .map(|texel| known_light(self.known, texel).unwrap_or_default())
             .collect();
-        for (texel, light) in unknown.iter().zip(sampled) {
-            direct[texel.place()] = light;
+        let mut samples = vec![usual; count];
+        let mut missing = vec![false; count];
+        unknown.iter().for_each(|texel| missing[texel.place()] = true);
+        for (texel, light) in sampled {
+            (direct[texel.place()], missing[texel.place()]) = (light, false);
         }
-        Ok(IndividualLight { direct, samples: vec![usual; count], doubtful: Vec::new() })
+        if let Some(blocks) = blocks {
+            let missing: Vec<CoveredTexel> =
+                unknown.into_iter().filter(|texel| missing[texel.place()]).collect();
+            let light = monitor.run_interruptible(1.0, || {
+                let keys = self.cuts.keys();
+                let interpolate = |texel: &CoveredTexel| {
+                    // Elsewhere a part of the light may be among the shared samples.
+                    let has_same_sources = |other: CoveredTexel| keys[other.place()] == keys[texel.place()];
+                    interpolated(&direct, &blocks.around(*texel, has_same_sources), blocks.of(*texel))
+                };
+                missing.par_iter().map(interpolate).collect::<Vec<Direct>>()
+            })?;
+            for (texel, light) in missing.iter().zip(light) {
+                (direct[texel.place()], samples[texel.place()]) = (light, 1);
+            }
+        }
+        Ok(IndividualLight { direct, samples, doubtful: Vec::new() })
     }
 
     /// Makes lamps share samples in blocks of which a good part lies in penumbrae of any source (see
     /// [`shares_penumbrae`]): behind a grille, or among many thin blockers. The visible share of each texel by itself
     /// would take hundreds of rays, while smoothing makes use of the neighbours' samples. The light of these blocks is
-    /// sampled again.
+    /// sampled again, unless the time is up.
     pub fn share_penumbrae(
         &mut self,
         direct: &mut [Direct],
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
+        if decide(monitor, monitor.clock().is_over())? {
+            return Ok(());
+        }
         let lamps = monitor.run_interruptible(0.0, || {
             let mut lamps = self.shafts.unresolved(&self.cuts, |_, cut| cut.has_all_lamps);
             if lamps.is_empty() {
@@ -189,7 +219,6 @@ impl<'a> SourceSampler<'a> {
         let keys = self.cuts.keys().into_iter().enumerate();
         let groups: Vec<u32> = keys.map(|(place, key)| 2 * key + u32::from(is_wanted(place))).collect();
         let neighbourhoods = Neighbourhoods::new(self.texels, &groups);
-        monitor.pass(PASS);
         let shared =
             SharedLight::new(self.sources, neighbourhoods, &self.cuts, is_wanted, self.options, monitor)?;
         Ok(Some(shared))
@@ -265,6 +294,23 @@ impl<'a> SourceSampler<'a> {
         }
         Ok(taken.len())
     }
+}
+
+/// The light of a texel that was not sampled, from the representatives around it and its own. By how much these differ
+/// counts as its error.
+fn interpolated(direct: &[Direct], around: &[(CoveredTexel, f32)], own: CoveredTexel) -> Direct {
+    let sum = |of: &dyn Fn(&Direct) -> Vec3| -> Vec3 {
+        around.iter().map(|(other, weight)| *weight * of(&direct[other.place()])).sum()
+    };
+    let (baked, mixed) = (sum(&|light| light.baked), sum(&|light| light.mixed));
+    let squared = |error: Vec3| error.length_squared() / 3.0;
+    let error = |(other, weight): &(CoveredTexel, f32)| {
+        let light = &direct[other.place()];
+        weight * (squared(light.baked - baked) + weight * light.variance)
+    };
+    let variance = around.iter().map(error).sum();
+    let seen = direct[own.place()].seen;
+    Direct { baked, mixed, variance, sampled: true, seen, ..Direct::default() }
 }
 
 /// The light of a texel from a previous bake.

@@ -10,11 +10,11 @@ use super::gather_sums::{GatherSums, UnguidedLight};
 use super::patch_fallback::{from_patches, knows_nothing};
 use super::radiance_cache::RadianceCache;
 use crate::chunks::decide;
-use crate::coverage::CoveredTexels;
+use crate::coverage::{CoveredTexels, Representatives};
 use crate::denoise::replicates::{mean, variance};
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::SampleAllocation;
-use crate::texel_index::{CoveredTexel, MapTexel};
+use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions};
 
 /// An evaluation takes about as much time as so many samples, per replicate, of every texel: 0.5 to 0.8 in the demo level,
@@ -45,11 +45,11 @@ pub(crate) fn cast_first_round(
     }
     // A sample of every texel is better than all samples in the first maps and none in the last; and first of one texel
     // of each block, for the same reason.
-    let representatives = representatives(texels);
+    let representatives = Representatives::new(texels, BLOCK_SIDE);
     let begun = monitor.seconds();
     let one_each = wanted.iter().map(|allocation| SampleAllocation { samples: 1, ..*allocation });
     let (first, rest): (Vec<_>, Vec<_>) =
-        one_each.partition(|allocation| representatives[allocation.texel.place()] == allocation.texel);
+        one_each.partition(|allocation| representatives.is_one(allocation.texel));
     // How many samples of every wanted texel there is time for, besides the evaluation that follows, which is one of all
     // texels.
     let open = texels.open().count() as f64;
@@ -81,29 +81,10 @@ pub(crate) fn cast_first_round(
         in_time = cache.cast(list, &more, gathered, seed, monitor)?;
     }
     if !in_time {
-        copy_representatives(&representatives, gathered);
+        copy_representatives(representatives.all(), gathered);
         from_patches(cache, texels, gathered, seed, knows_nothing, monitor)?;
     }
     Ok(in_time)
-}
-
-/// For each texel, the first one of its block if both are open, of the same chart and not divided by a wall; otherwise
-/// the texel itself.
-fn representatives(texels: &CoveredTexels<'_>) -> Vec<CoveredTexel> {
-    let is_whole = |texel: &CoveredTexel| texels.divided.binary_search(texel).is_err();
-    let whole_at = |place: MapTexel| texels.open_at(place).filter(is_whole);
-    let chart = |place: CoveredTexel| texels.charts[texels.list[place.place()].triangle as usize];
-    CoveredTexel::all(texels.list.len())
-        .map(|place| {
-            let texel = &texels.list[place.place()];
-            if whole_at(texel.index).is_none() {
-                return place;
-            }
-            let map = &texels.layout.maps[texel.map.place()];
-            let corner = map.texel(texel.x / BLOCK_SIDE * BLOCK_SIDE, texel.y / BLOCK_SIDE * BLOCK_SIDE);
-            whole_at(corner).filter(|&corner| chart(corner) == chart(place)).unwrap_or(place)
-        })
-        .collect()
 }
 
 /// Gives every texel without samples those of its representative, if that has any. The error that is stated for it
