@@ -29,6 +29,7 @@ use crate::interruption::Interruption;
 use crate::lightmap_report::{FileLine, summary_of_files, warnings_of_files};
 use crate::loading::{Loaded, extension, load_source};
 use crate::progress::Shown;
+use crate::warnings::shortened;
 
 /// Runs the command.
 pub fn run(asked: &Bake) -> anyhow::Result<()> {
@@ -73,7 +74,8 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     for note in saved.notes {
         eprintln!("lumbre: note: {}: {note}", asked.output.display());
     }
-    for warning in report.warnings.iter().cloned().chain(warnings_of_files(&saved.lightmaps)) {
+    let warnings = report.warnings.iter().cloned().chain(warnings_of_files(&saved.lightmaps));
+    for warning in shortened(warnings) {
         eprintln!("lumbre: warning: {warning}");
     }
     let lightmaps: Vec<FileLine> = saved.lightmaps.iter().map(FileLine::from).collect();

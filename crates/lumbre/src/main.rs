@@ -19,6 +19,7 @@ mod render;
 mod report_commands;
 mod trace;
 mod tune;
+mod warnings;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

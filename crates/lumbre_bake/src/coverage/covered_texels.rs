@@ -2,7 +2,7 @@
 
 use super::charts::charts;
 use super::contact_lines::ContactLines;
-use super::divided_texels::{contact_lines, divided_texels};
+use super::divided_texels::{FoundLines, contact_lines, divided_texels};
 use super::footprint::{Texel, footprints, open_texels};
 use super::hidden::remove_hidden;
 use crate::BakeError;
@@ -37,9 +37,10 @@ impl<'a> CoveredTexels<'a> {
         layout: &'a LightmapLayout,
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(Self, StageNotes), BakeError> {
-        let (mut list, charts, (contacts, hiding)) = monitor.run_interruptible(0.0, || {
-            (footprints(scene, layout), charts(scene), contact_lines(scene, layout))
-        })?;
+        let (mut list, charts, FoundLines { all: contacts, hiding }) = monitor
+            .run_interruptible(0.0, || {
+                (footprints(scene, layout), charts(scene), contact_lines(scene, layout))
+            })?;
         // Divided texels are found twice: first from the whole footprints, as they may hide something that rays miss,
         // and again from the footprints that are left once hidden parts are removed.
         let maybe_divided: Vec<MapTexel> = monitor.run_interruptible(0.0, || {

@@ -19,21 +19,29 @@ const MIN_LENGTH: f64 = 0.25;
 /// Distance from a line, in texels, up to which a point counts as on the line and not beyond it.
 const MARGIN: f64 = 0.05;
 
-/// The contact lines on everything that the maps show, except on triangles for which [`has_contact_lines`] is false; and
-/// those of them that may hide something.
-pub(crate) fn contact_lines(scene: &BakeScene, layout: &LightmapLayout) -> (ContactLines, ContactLines) {
+/// The contact lines on everything that the maps show.
+#[derive(Default)]
+pub(crate) struct FoundLines {
+    pub all: ContactLines,
+    /// Those beside which something may be hidden.
+    pub hiding: ContactLines,
+}
+
+/// Finds the contact lines on all triangles but those for which [`has_contact_lines`] is false.
+pub(crate) fn contact_lines(scene: &BakeScene, layout: &LightmapLayout) -> FoundLines {
     let mut lines: Vec<(MapTexel, Contact)> = (0..scene.triangles.len())
         .into_par_iter()
         .flat_map_iter(|index| texels_crossed_on(scene, layout, index))
         .collect();
     // Where a mesh is as fine as its texels there are millions of lines to sort.
     if scene.stop.is_cancelled() {
-        return Default::default();
+        return FoundLines::default();
     }
     lines.par_sort_by_key(|(texel, _)| *texel);
-    let line = |(texel, contact): &(MapTexel, Contact)| (*texel, contact.line);
-    let hiding = lines.iter().filter(|(_, contact)| contact.may_hide).map(line).collect();
-    (ContactLines::new(lines.iter().map(line).collect()), ContactLines::new(hiding))
+    let line = |(texel, contact): (MapTexel, Contact)| (texel, contact.line);
+    let hiding = lines.iter().filter(|(_, contact)| contact.may_hide).copied().map(line).collect();
+    let all = lines.into_iter().map(line).collect();
+    FoundLines { all: ContactLines::new(all), hiding: ContactLines::new(hiding) }
 }
 
 /// Those of the crossed texels that their contact lines divide, in ascending order. `open_by_place` holds the texel at
@@ -61,7 +69,8 @@ pub(crate) fn has_contact_lines(triangle: &SceneTriangle) -> bool {
     !triangle.is_hidden_duplicate && doubled_area.is_finite() && doubled_area > 2.0
 }
 
-/// The texels that contact lines on a triangle cross, each with the part of the line in the texel's unit square.
+/// The texels that contact lines on a triangle cross, each with the part of the line in the texel, in the texel's
+/// unit square.
 fn texels_crossed_on(scene: &BakeScene, layout: &LightmapLayout, index: usize) -> Vec<(MapTexel, Contact)> {
     let triangle = &scene.triangles[index];
     let map = &layout.maps[triangle.map.place()];
@@ -162,8 +171,8 @@ mod tests {
     use crate::{BakeOptions, Density};
 
     /// How many texels contact lines cross in a scene of meshes at these positions, and how many lines that may hide
-    /// something do.
-    fn count_crossed(meshes: Vec<(TriangleMesh, DVec3)>) -> [usize; 2] {
+    /// something do; the outside may be dark.
+    fn count_crossed(meshes: Vec<(TriangleMesh, DVec3)>, dark_outside: bool) -> [usize; 2] {
         let object = |(mesh, place): (TriangleMesh, DVec3)| {
             let transform = DAffine3::from_translation(place);
             let material = Material { double_sided: true, ..Material::default() };
@@ -174,8 +183,9 @@ mod tests {
         let objects = meshes.into_iter().map(object).collect();
         let input = StaticScene { objects, sky: Vec3::ONE, ..StaticScene::default() }.checked().unwrap();
         let options = BakeOptions { density: Density::TexelsPerMeter(8.0), ..BakeOptions::default() };
-        let (layout, scene) = laid_out(&input.objects, input.space(), &options);
-        let (all, hiding) = super::contact_lines(&scene, &layout);
+        let (layout, mut scene) = laid_out(&input.objects, input.space(), &options);
+        scene.dark_outside = dark_outside;
+        let FoundLines { all, hiding } = super::contact_lines(&scene, &layout);
         [all, hiding].map(|lines| {
             let mut texels: Vec<MapTexel> = lines.iter().map(|(texel, _)| *texel).collect();
             texels.dedup();
@@ -189,12 +199,12 @@ mod tests {
         let mut room = shapes::cuboid(Vec3::new(4.0, 3.0, 4.0), 4);
         room.indices.chunks_exact_mut(3).for_each(|corners| corners.swap(1, 2));
         room.normals.iter_mut().for_each(|normal| *normal = -*normal);
-        assert_eq!(count_crossed(vec![(room.clone(), DVec3::ZERO)]), [0, 0]);
+        assert_eq!(count_crossed(vec![(room.clone(), DVec3::ZERO)], false), [0, 0]);
         // A block of 1 m stands on its floor: the 4 m outline on the floor, and the 4 m along the bottoms of its sides,
         // each cross about 8 texels per metre.
         let block = shapes::cuboid(Vec3::ONE, 1);
         let block = (block, DVec3::new(0.3, -1.0, 0.4));
-        let [crossed, hiding] = count_crossed(vec![(room.clone(), DVec3::ZERO), block.clone()]);
+        let [crossed, hiding] = count_crossed(vec![(room.clone(), DVec3::ZERO), block.clone()], false);
         assert!((56..90).contains(&crossed) && hiding == crossed, "{crossed} {hiding}");
         // Ten leaves that cross each other divide texels, but nothing is hidden beside them: only below the block.
         let leaf = |number: usize| {
@@ -203,8 +213,9 @@ mod tests {
             leaf.positions.iter_mut().for_each(|position| *position = turn * *position);
             (leaf, DVec3::new(-0.8, 0.0, -0.8))
         };
-        let meshes = [(room, DVec3::ZERO), block].into_iter().chain((0..10).map(leaf));
-        let [with_leaves, hiding] = count_crossed(meshes.collect());
+        let meshes: Vec<_> = [(room, DVec3::ZERO), block].into_iter().chain((0..10).map(leaf)).collect();
+        let [with_leaves, hiding] = count_crossed(meshes.clone(), false);
         assert!(with_leaves > 2 * crossed && hiding == crossed, "{with_leaves} {hiding}");
+        assert_eq!(count_crossed(meshes, true), [with_leaves; 2], "beyond a sheet it may be dark");
     }
 }

@@ -1,12 +1,14 @@
 //! Representatives: one texel of each block of a chart, which stands for the others where there is no time for all of
 //! them. What the others show is copied or interpolated from representatives by those who compute it.
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
 use glam::Vec2;
 use rayon::prelude::*;
 
 use super::covered_texels::CoveredTexels;
 use super::footprint::Texel;
-use super::texel_groups::TexelGroups;
 use crate::texel_index::CoveredTexel;
 
 /// The representatives of the texels in blocks of some size.
@@ -15,47 +17,38 @@ pub(crate) struct Representatives<'a> {
     /// Texels along a block's side.
     side: u32,
     /// Per covered texel, its representative.
-    of: Vec<CoveredTexel>,
+    list: Vec<CoveredTexel>,
 }
 
 impl<'a> Representatives<'a> {
     /// One for each block of `side` x `side` texels of one chart: the texel nearest the block's middle. Texels represent
     /// themselves if they are hidden, if a thin wall divides them, or if a contact line separates them from the
-    /// representative of their block.
+    /// representative of their block. (On triangles smaller than a texel contact lines are not known.) If the bake is
+    /// cancelled, the rest represent themselves.
     pub fn new(texels: &'a CoveredTexels<'a>, side: u32) -> Self {
-        let list = &texels.list;
-        let blocks = TexelGroups::blocks(list, &texels.charts, side);
-        let from_middle = |texel: &CoveredTexel| {
-            let Texel { x, y, .. } = &list[texel.place()];
-            [x, y].map(|at| (2 * (at % side) + 1).abs_diff(side).pow(2)).iter().sum::<u32>()
-        };
-        let nearest = |members: &Vec<CoveredTexel>| {
-            let whole = members.iter().copied().filter(|&texel| !is_divided(texels, texel));
-            whole.min_by_key(from_middle)
-        };
-        let of_block: Vec<Option<CoveredTexel>> = blocks.members.iter().map(nearest).collect();
+        let of_block = nearest_the_middle(texels, side);
         let of_texel = |place: usize| {
             let texel = CoveredTexel::new(place);
-            let stands_alone = list[place].is_hidden() || is_divided(texels, texel);
-            let of_block = of_block[blocks.group_of[place] as usize].filter(|_| !stands_alone);
+            let stands_alone = !is_whole(texels, texel) || texels.scene.stop.is_cancelled();
+            let of_block = of_block[place].filter(|_| !stands_alone);
             of_block.filter(|&other| !are_separated(texels, [texel, other])).unwrap_or(texel)
         };
-        let of = (0..list.len()).into_par_iter().map(of_texel).collect();
-        Self { texels, side, of }
+        let list = (0..texels.list.len()).into_par_iter().map(of_texel).collect();
+        Self { texels, side, list }
     }
 
     /// The representative of a texel, perhaps itself.
     pub fn of(&self, texel: CoveredTexel) -> CoveredTexel {
-        self.of[texel.place()]
+        self.list[texel.place()]
     }
 
     /// Per covered texel, its representative.
-    pub fn all(&self) -> &[CoveredTexel] {
-        &self.of
+    pub fn list(&self) -> &[CoveredTexel] {
+        &self.list
     }
 
     /// Whether a texel represents itself, and perhaps others.
-    pub fn is_one(&self, texel: CoveredTexel) -> bool {
+    pub fn represents_itself(&self, texel: CoveredTexel) -> bool {
         self.of(texel) == texel
     }
 
@@ -69,24 +62,24 @@ impl<'a> Representatives<'a> {
     ) -> Vec<(CoveredTexel, f32)> {
         let Self { texels, side, .. } = *self;
         let list = &texels.list;
-        let of = &list[texel.place()];
-        let map = &texels.layout.maps[of.map.place()];
+        let shown = &list[texel.place()];
+        let map = &texels.layout.maps[shown.map.place()];
         let mut around: Vec<(CoveredTexel, f32)> = Vec::new();
         for step in 0..9 {
             // One block to the left or above is a negative step, which wraps and is out of the map then.
-            let [x, y] =
-                [(of.x, step % 3), (of.y, step / 3)].map(|(at, to)| (at + to * side).wrapping_sub(side));
+            let [x, y] = [(shown.x, step % 3), (shown.y, step / 3)]
+                .map(|(at, to)| (at + to * side).wrapping_sub(side));
             if x >= map.width || y >= map.height {
                 continue;
             }
             let near = texels.open_at(map.texel(x, y)).map(|near| self.of(near));
             let is_new = |near: &CoveredTexel| around.iter().all(|(other, _)| other != near);
             let is_like_it =
-                |near: &CoveredTexel| texels.chart(&list[near.place()]) == texels.chart(of) && fits(*near);
+                |near: &CoveredTexel| texels.chart(&list[near.place()]) == texels.chart(shown) && fits(*near);
             let Some(near) = near.filter(is_new).filter(is_like_it) else { continue };
-            let distance = (middle(&list[near.place()]) - middle(of)).abs() / side as f32;
+            let distance = (middle(&list[near.place()]) - middle(shown)).abs() / side as f32;
             let weight = (1.0 - distance.x).max(0.0) * (1.0 - distance.y).max(0.0);
-            if weight > 0.0 && !is_divided(texels, near) && !are_separated(texels, [texel, near]) {
+            if weight > 0.0 && is_whole(texels, near) && !are_separated(texels, [texel, near]) {
                 around.push((near, weight));
             }
         }
@@ -99,8 +92,38 @@ impl<'a> Representatives<'a> {
     }
 }
 
-fn is_divided(texels: &CoveredTexels<'_>, texel: CoveredTexel) -> bool {
-    texels.divided.binary_search(&texel).is_ok()
+/// Per covered texel, the texel nearest the middle of its block, of those that are whole.
+fn nearest_the_middle(texels: &CoveredTexels<'_>, side: u32) -> Vec<Option<CoveredTexel>> {
+    let mut blocks: HashMap<[u32; 4], u32> = HashMap::new();
+    // Per block, the texel and its squared distance from the middle, in half texels.
+    let mut nearest: Vec<(Option<CoveredTexel>, u32)> = Vec::new();
+    let block_of = |(place, texel): (usize, &Texel)| {
+        let key = [texel.map.0, texels.chart(texel), texel.x / side, texel.y / side];
+        let block = match blocks.entry(key) {
+            Entry::Occupied(block) => *block.get(),
+            Entry::Vacant(block) => {
+                nearest.push((None, u32::MAX));
+                *block.insert(nearest.len() as u32 - 1)
+            }
+        };
+        let from_middle = |at: u32| (2 * (at % side) + 1).abs_diff(side).pow(2);
+        let distance = from_middle(texel.x) + from_middle(texel.y);
+        let (_, least) = nearest[block as usize];
+        if distance < least && is_whole(texels, CoveredTexel::new(place)) {
+            nearest[block as usize] = (Some(CoveredTexel::new(place)), distance);
+        }
+        block
+    };
+    let in_time = texels.list.iter().take_while(|_| !texels.scene.stop.is_cancelled());
+    let mut block_of_texel: Vec<u32> = in_time.enumerate().map(block_of).collect();
+    // After a cancellation, which discards the result, any block will do.
+    block_of_texel.resize(texels.list.len(), 0);
+    block_of_texel.iter().map(|&block| nearest.get(block as usize).and_then(|(texel, _)| *texel)).collect()
+}
+
+/// Whether one value can stand for all of a texel: it is in the open, and no thin wall divides it.
+fn is_whole(texels: &CoveredTexels<'_>, texel: CoveredTexel) -> bool {
+    !texels.list[texel.place()].is_hidden() && texels.divided.binary_search(&texel).is_err()
 }
 
 /// The middle of a texel on its map, in texels.
@@ -140,7 +163,7 @@ mod tests {
             };
             for (texel, Texel { x, y, .. }) in texels.open() {
                 let around = blocks.around(texel, |_| true);
-                assert!(around.iter().all(|(other, _)| blocks.is_one(*other)));
+                assert!(around.iter().all(|(other, _)| blocks.represents_itself(*other)));
                 let sum: f32 = around.iter().map(|(_, weight)| weight).sum();
                 assert!((sum - 1.0).abs() < 1e-5, "{sum}");
                 // Beyond the outermost representatives there is nothing to interpolate with.
@@ -149,7 +172,7 @@ mod tests {
                     assert!((light - value(texel)).abs() < 1e-3, "{light} {}", value(texel));
                 }
             }
-            assert_eq!(texels.open().filter(|(texel, _)| blocks.is_one(*texel)).count(), 8 * 8);
+            assert_eq!(texels.open().filter(|(texel, _)| blocks.represents_itself(*texel)).count(), 8 * 8);
         });
     }
 
@@ -176,16 +199,19 @@ mod tests {
             let point = texels.list[texel.place()].point(&scene, 0.5, 0.5).expect("it is in the open");
             scene.space.world(receiver(&scene, &point).position).x > WALL
         };
-        let on_floor = texels.open().filter(|(texel, of)| of.map.0 == 0 && !is_divided(&texels, *texel));
+        let on_floor = texels.open().filter(|(texel, of)| of.map.0 == 0 && is_whole(&texels, *texel));
         let (mut count, mut interpolated) = (0, 0);
         for (texel, _) in on_floor {
             let around = blocks.around(texel, |_| true);
             assert!(around.iter().all(|(other, _)| is_beyond(*other) == is_beyond(texel)));
             assert_eq!(is_beyond(blocks.of(texel)), is_beyond(texel));
             count += 1;
-            interpolated += u32::from(!blocks.is_one(texel));
+            interpolated += u32::from(!blocks.represents_itself(texel));
             // If nothing fits, the texel's own representative must.
             assert_eq!(blocks.around(texel, |_| false), [(blocks.of(texel), 1.0)]);
+            let fits = |other: CoveredTexel| other.0.is_multiple_of(2);
+            let around = blocks.around(texel, fits);
+            assert!(around.iter().all(|(other, _)| fits(*other)) || around == [(blocks.of(texel), 1.0)]);
         }
         assert!(count > 3900 && interpolated > 3000, "{interpolated} of {count}");
     }

@@ -1,5 +1,6 @@
 //! Direct light of every covered texel. Sources that matter by themselves are sampled individually, in passes: a few
-//! shadow rays everywhere; many where the first pass saw a source partly, or saw other sources than a texel nearby,
+//! shadow rays everywhere (or, where time is too short for that, on a grid of texels from which `sparse_pass` lets the
+//! others be interpolated); many where the first pass saw a source partly, or saw other sources than a texel nearby,
 //! unless its result was exact (so the faint ends of a penumbra are found from their neighbours); then more where the
 //! requested error is not yet in reach. Under a time limit the later passes are made for one error after the other, from a
 //! coarse one to the requested one. Sources that do not matter by themselves share samples: that is `shared_light`. So do
@@ -68,13 +69,16 @@ pub(crate) fn direct_light(
 ) -> Result<(DirectLight, StageNotes), BakeError> {
     let mut sampler = SourceSampler::new(sources, texels, known, options, monitor)?;
     let mut light = sampler.first_pass(monitor)?;
-    sampler.share_penumbrae(&mut light.direct, monitor)?;
+    // That samples whole blocks anew, for which there is no time if even the first pass had too little.
+    if light.is_complete {
+        sampler.share_penumbrae(&mut light.direct, monitor)?;
+    }
     let mut shared = sampler.shared_light(monitor)?;
     let so_far = shared.as_ref().map(|shared| shared.with(&light.direct));
     monitor.pass(PASS_OF_LOCAL_LIGHT);
     let so_far = so_far.as_deref().unwrap_or(&light.direct);
     let local = LocalLight::new(sources, texels, &sampler.cuts.blocks, so_far, monitor)?;
-    light.doubtful = sampler.doubtful_texels(&light.direct);
+    light.doubtful = sampler.doubtful_texels(&light);
     let mut seconds_of_last_goal = 0.0;
     for (step, error) in error_goals(options).into_iter().enumerate() {
         if step > 0 && is_late_for_finer_goal(seconds_of_last_goal, monitor)? {

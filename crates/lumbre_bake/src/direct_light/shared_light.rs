@@ -1,4 +1,5 @@
-//! Direct light of the sources that share samples, for every covered texel: a few samples everywhere, smoothed over
+//! Direct light of the sources that share samples, for every covered texel: a few samples everywhere (where time is too
+//! short for that, on a grid of texels from which the others are interpolated), smoothed over
 //! neighbours that have the same light cut, then more where they are worth most, until direct light leaves no more than
 //! its share of the requested error. Where many more would be needed, `control_variates` lower their noise. Single samples
 //! are taken in `sources::shared_samples`; individually sampled sources are the parent module's.
@@ -11,7 +12,7 @@ use super::control_variates::{control_cost, mean_controlled_light, variance_left
 use super::error_goals::ErrorGoals;
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
-use super::sparse_pass::{SparsePass, sparse_pass};
+use super::sparse_pass::{SparsePass, relative_difference, sparse_pass};
 use super::views::ErrorsInViews;
 use crate::chunks::{decide, in_chunks_until_deadline};
 use crate::coverage::{Representatives, Texel, TileSequence, receiver};
@@ -23,6 +24,7 @@ use crate::sample_allocation::{
 };
 use crate::sampling::{Stream, hash};
 use crate::sources::{Direct, Sources};
+use crate::squared_errors::SquaredErrors;
 use crate::texel_index::CoveredTexel;
 use crate::{BakeError, BakeOptions};
 
@@ -84,9 +86,15 @@ impl SampleSums {
     }
 }
 
-/// The sums of a texel that was not sampled, from texels around it; and by how much their light differs, as the squared
-/// length of its channels, beyond what is noise.
-fn interpolated(sums: &[SampleSums], around: &[(CoveredTexel, f32)]) -> (SampleSums, f64) {
+/// The squared light of sums, mean of the channels, without what is noise; may be negative.
+fn squared_light(sums: &SampleSums) -> f64 {
+    let estimates = sums.estimates();
+    f64::from((mean(&estimates).length_squared() - variance(&estimates).element_sum()) / 3.0)
+}
+
+/// The sums of a texel that was not sampled, from texels around it; and, if these are several, the square of by how much
+/// their light differs beyond what is noise, mean of the channels; may be negative.
+fn interpolated(sums: &[SampleSums], around: &[(CoveredTexel, f32)]) -> (SampleSums, Option<f64>) {
     let mut sum = SampleSums::default();
     for (other, weight) in around {
         let other = &sums[other.place()];
@@ -103,9 +111,9 @@ fn interpolated(sums: &[SampleSums], around: &[(CoveredTexel, f32)]) -> (SampleS
     let difference = |(other, weight): &(CoveredTexel, f32)| {
         let estimates = sums[other.place()].estimates();
         let noise = (1.0 - weight) * variance(&estimates).element_sum();
-        f64::from(weight * ((mean(&estimates) - light).length_squared() - noise))
+        f64::from(weight * ((mean(&estimates) - light).length_squared() - noise) / 3.0)
     };
-    (sum, around.iter().map(difference).sum())
+    (sum, (around.len() > 1).then(|| around.iter().map(difference).sum()))
 }
 
 /// The sums of all texels, with what is needed to sample and smooth more.
@@ -151,7 +159,6 @@ impl<'a> SharedLight<'a> {
             smoothed: Denoised::default(),
         };
         // A complete map comes first; if time is limited, with a single sample, and perhaps interpolated.
-        let begun = monitor.seconds();
         let few = if options.time.is_some() { 1 } else { first };
         let is_sampled = |texel: &CoveredTexel| {
             is_wanted(texel.place())
@@ -159,7 +166,7 @@ impl<'a> SharedLight<'a> {
                 && !cuts.of(*texel).shared.is_empty()
         };
         let wanted: Vec<CoveredTexel> = CoveredTexel::all(texels.len()).filter(is_sampled).collect();
-        let SparsePass { sampled, blocks } =
+        let SparsePass { sampled, seconds, blocks } =
             sparse_pass(light.neighbourhoods.texels, &wanted, PASS, monitor, |texel| {
                 let mut sums = SampleSums::default();
                 light.add(texel.place(), &mut sums, few);
@@ -169,7 +176,7 @@ impl<'a> SharedLight<'a> {
         for (texel, sums) in sampled {
             light.sums[texel.place()] = sums;
         }
-        let samples = monitor.clock().affordable(few, first, monitor.seconds() - begun);
+        let samples = monitor.clock().affordable(few, first, seconds);
         let samples = decide(monitor, samples)?;
         if let Some(blocks) = blocks {
             monitor.run_interruptible(1.0, || light.interpolate(&wanted, &blocks))?;
@@ -190,29 +197,44 @@ impl<'a> SharedLight<'a> {
     /// Interpolates the sums of those of the `wanted` texels that have none, and notes how uncertain that is.
     fn interpolate(&mut self, wanted: &[CoveredTexel], blocks: &Representatives<'_>) {
         let keys = self.cuts.keys();
-        let (known, missing): (Vec<CoveredTexel>, Vec<CoveredTexel>) =
-            wanted.iter().partition(|texel| self.sums[texel.place()].samples > 0);
-        if known.is_empty() {
-            return;
-        }
+        let missing: Vec<CoveredTexel> =
+            wanted.iter().copied().filter(|texel| self.sums[texel.place()].samples == 0).collect();
         let interpolate = |texel: &CoveredTexel| {
+            if self.sources.scene.stop.is_cancelled() {
+                return (SampleSums::default(), None);
+            }
             let fits = |other: CoveredTexel| {
                 keys[other.place()] == keys[texel.place()] && self.sums[other.place()].samples > 0
             };
             interpolated(&self.sums, &blocks.around(*texel, fits))
         };
-        let sums: Vec<(SampleSums, f64)> = missing.par_iter().map(interpolate).collect();
-        let light = |sums: &SampleSums| f64::from(mean(&sums.estimates()).length_squared());
-        let (mut squared_differences, mut squared_light) = (0.0, 0.0);
-        for (texel, (sums, differences)) in missing.iter().zip(sums) {
-            squared_differences += differences;
-            squared_light += light(&sums);
-            self.sums[texel.place()] = sums;
-        }
-        let relative = squared_differences.max(0.0) / squared_light;
-        let relative = if relative.is_finite() { relative.min(1.0) as f32 } else { 1.0 };
+        let sums: Vec<(SampleSums, Option<f64>)> = missing.par_iter().map(interpolate).collect();
+        let pairs = sums.iter().filter_map(|(sums, difference)| Some([(*difference)?, squared_light(sums)]));
+        // Above 0, as it marks what is interpolated.
+        let relative = relative_difference(pairs).max(f32::MIN_POSITIVE);
         self.interpolation_errors = vec![0.0; self.sums.len()];
-        missing.iter().for_each(|texel| self.interpolation_errors[texel.place()] = relative);
+        for (texel, (sums, _)) in missing.iter().zip(sums) {
+            self.sums[texel.place()] = sums;
+            self.interpolation_errors[texel.place()] = relative;
+        }
+    }
+
+    /// Whether the sums of a texel are interpolated.
+    fn is_interpolated(&self, place: usize) -> bool {
+        self.interpolation_errors.get(place).is_some_and(|error| *error > 0.0)
+    }
+
+    /// The errors of the smoothed light.
+    fn errors(&self) -> SquaredErrors {
+        let errors = self.smoothed.errors();
+        if self.interpolation_errors.is_empty() {
+            return errors;
+        }
+        let squared_light = |estimates: &Estimates| mean(estimates).length_squared() / 3.0;
+        let by_texel = self.interpolation_errors.par_iter().zip(&self.smoothed.estimates);
+        let interpolation: Vec<f32> =
+            by_texel.map(|(error, estimates)| error * squared_light(estimates)).collect();
+        errors.with(&interpolation)
     }
 
     /// Adds samples to the sums of a texel until each replicate has `samples`.
@@ -277,7 +299,7 @@ impl<'a> SharedLight<'a> {
         let least_goal = goals.of_shared(goals.share_for(0.0), left_by_individual);
         let (mut before, mut chosen_goal, mut tried_controls) = ([f64::INFINITY; 2], None, false);
         loop {
-            let relative = local.relative_errors(&self.smoothed.errors());
+            let relative = local.relative_errors(&self.errors());
             let is_sampled = |texel: &CoveredTexel| self.sums[texel.place()].samples > 0;
             let sampled: Vec<CoveredTexel> =
                 CoveredTexel::all(self.texels.len()).filter(is_sampled).collect();
@@ -336,13 +358,20 @@ impl<'a> SharedLight<'a> {
             };
             monitor.pass(PASS);
             let mut sums = std::mem::take(&mut self.sums);
-            let taken = take_samples(&allocated, &mut sums, monitor, |to, mut sums| {
-                self.add(to.texel.place(), &mut sums, to.samples);
+            let taken = take_samples(&allocated, &mut sums, monitor, |to, sums| {
+                let place = to.texel.place();
+                let mut sums = if self.is_interpolated(place) { SampleSums::default() } else { sums };
+                self.add(place, &mut sums, to.samples);
                 sums
             })?;
             self.sums = sums;
             if taken.is_empty() {
                 return Ok(());
+            }
+            for to in taken {
+                if let Some(error) = self.interpolation_errors.get_mut(to.texel.place()) {
+                    *error = 0.0;
+                }
             }
             self.smoothed = self.smooth(monitor)?;
         }
@@ -404,19 +433,18 @@ impl<'a> SharedLight<'a> {
 
     /// Adds the smoothed light to that of the individually sampled sources.
     pub fn add_to(self, direct: &mut [Direct]) {
-        let (variances, Denoised { estimates, .. }) = (self.smoothed.errors(), self.smoothed);
-        let interpolation_error = |place: usize| self.interpolation_errors.get(place).copied().unwrap_or(0.0);
-        for (place, (direct, sums)) in direct.iter_mut().zip(&self.sums).enumerate() {
+        let variances = self.errors();
+        for (place, direct) in direct.iter_mut().enumerate() {
+            let sums = &self.sums[place];
             if sums.samples > 0 {
-                let (estimates, variance) = (&estimates[place], variances.cautious[place]);
-                let light = mean(estimates).max(Vec3::ZERO);
-                direct.baked += light;
-                direct.variance += interpolation_error(place) * light.length_squared() / 3.0;
+                let (estimates, variance) = (&self.smoothed.estimates[place], variances.cautious[place]);
+                direct.baked += mean(estimates).max(Vec3::ZERO);
                 direct.mixed += sums.mixed / (sums.samples * REPLICATES as u32) as f32;
                 direct.variance += variance;
                 direct.caution += variance - variances.expected[place];
                 direct.rays += sums.rays;
-                direct.samples_without_ray += (sums.samples * REPLICATES as u32).saturating_sub(sums.rays);
+                let taken = if self.is_interpolated(place) { 0 } else { sums.samples * REPLICATES as u32 };
+                direct.samples_without_ray += taken.saturating_sub(sums.rays);
                 if sums.controlled_light.is_some() {
                     // So that the gather knows how much of the time it has taken.
                     let shared = &self.cuts.of(CoveredTexel::new(place)).shared;

@@ -10,10 +10,10 @@ use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
 use super::shafts::Shafts;
 use super::shared_light::SharedLight;
-use super::sparse_pass::{SparsePass, sparse_pass};
+use super::sparse_pass::{relative_difference, sparse_pass};
 use super::views::ErrorsInViews;
 use crate::chunks::{decide, in_chunks};
-use crate::coverage::{CoveredTexels, Texel, receiver};
+use crate::coverage::{CoveredTexels, Representatives, Texel, receiver};
 use crate::denoise::Neighbourhoods;
 use crate::monitor::BakeMonitor;
 use crate::sample_allocation::{
@@ -28,10 +28,12 @@ use crate::{BakeError, BakeOptions};
 pub(crate) struct IndividualLight {
     /// Per covered texel.
     pub direct: Vec<Direct>,
-    /// Samples that have been taken, per covered texel.
+    /// Samples that have been taken, per covered texel, or [`INTERPOLATED`].
     samples: Vec<u32>,
     /// The texels that may need more samples than the first pass takes.
     pub doubtful: Vec<CoveredTexel>,
+    /// Whether there was time to sample all of them.
+    pub is_complete: bool,
 }
 
 impl IndividualLight {
@@ -128,55 +130,84 @@ impl<'a> SourceSampler<'a> {
     /// Known light, and a few samples of every other texel, or of so many that there is time for: the others are
     /// interpolated.
     pub fn first_pass(&self, monitor: &mut BakeMonitor<'_>) -> Result<IndividualLight, BakeError> {
-        let unknown: Vec<CoveredTexel> = self.unknown().collect();
+        let is_open = |texel: &CoveredTexel| !self.texels.list[texel.place()].is_hidden();
+        let unknown: Vec<CoveredTexel> = self.unknown().filter(is_open).collect();
         let [usual, ..] = self.options.effort().direct;
         let is_time_short = decide(monitor, monitor.clock().is_past(SHORT_OF_TIME))?;
         let few = if is_time_short { usual.min(LATE_SAMPLES) } else { usual };
         let clock = monitor.clock();
-        let SparsePass { sampled, blocks } = sparse_pass(self.texels, &unknown, PASS, monitor, |texel| {
+        let pass = sparse_pass(self.texels, &unknown, PASS, monitor, |texel| {
             self.light(texel, if clock.is_over() { few.min(LATE_SAMPLES) } else { few })
         })?;
         let count = self.texels.list.len();
-        let mut direct: Vec<Direct> = CoveredTexel::all(count)
+        let direct: Vec<Direct> = CoveredTexel::all(count)
             .map(|texel| known_light(self.known, texel).unwrap_or_default())
             .collect();
-        let mut samples = vec![usual; count];
-        let mut missing = vec![false; count];
-        unknown.iter().for_each(|texel| missing[texel.place()] = true);
-        for (texel, light) in sampled {
-            (direct[texel.place()], missing[texel.place()]) = (light, false);
+        let mut light = IndividualLight {
+            direct,
+            samples: vec![usual; count],
+            doubtful: Vec::new(),
+            is_complete: pass.blocks.is_none(),
+        };
+        let mut is_missing = vec![false; count];
+        unknown.iter().for_each(|texel| is_missing[texel.place()] = true);
+        for (texel, sampled) in pass.sampled {
+            light.direct[texel.place()] = sampled;
+            is_missing[texel.place()] = false;
         }
-        if let Some(blocks) = blocks {
+        if let Some(blocks) = pass.blocks {
             let missing: Vec<CoveredTexel> =
-                unknown.into_iter().filter(|texel| missing[texel.place()]).collect();
-            let light = monitor.run_interruptible(1.0, || {
-                let keys = self.cuts.keys();
-                let interpolate = |texel: &CoveredTexel| {
-                    // Elsewhere a part of the light may be among the shared samples.
-                    let has_same_sources = |other: CoveredTexel| keys[other.place()] == keys[texel.place()];
-                    interpolated(&direct, &blocks.around(*texel, has_same_sources), blocks.of(*texel))
-                };
-                missing.par_iter().map(interpolate).collect::<Vec<Direct>>()
-            })?;
-            for (texel, light) in missing.iter().zip(light) {
-                (direct[texel.place()], samples[texel.place()]) = (light, 1);
+                unknown.into_iter().filter(|texel| is_missing[texel.place()]).collect();
+            let interpolated =
+                monitor.run_interruptible(1.0, || self.interpolated(&light.direct, &missing, &blocks))?;
+            for (texel, interpolated) in missing.iter().zip(interpolated) {
+                light.direct[texel.place()] = interpolated;
+                light.samples[texel.place()] = INTERPOLATED;
             }
         }
-        Ok(IndividualLight { direct, samples, doubtful: Vec::new() })
+        Ok(light)
+    }
+
+    /// The light of texels that were not sampled, from the representatives around each. By how much these differ counts as
+    /// its error; where there is only one, by how much they differ elsewhere.
+    fn interpolated(
+        &self,
+        direct: &[Direct],
+        missing: &[CoveredTexel],
+        blocks: &Representatives<'_>,
+    ) -> Vec<Direct> {
+        let keys = self.cuts.keys();
+        let interpolate = |texel: &CoveredTexel| {
+            if self.texels.scene.stop.is_cancelled() {
+                return (Direct::default(), None);
+            }
+            // Elsewhere a part of the light may be among the shared samples, as it is in all that is known.
+            let fits =
+                |other: CoveredTexel| self.is_wanted(other) && keys[other.place()] == keys[texel.place()];
+            interpolated(direct, &blocks.around(*texel, fits), blocks.of(*texel))
+        };
+        let (mut light, differences): (Vec<Direct>, Vec<Option<f32>>) =
+            missing.par_iter().map(interpolate).unzip();
+        let squared_light = |light: &Direct| light.baked.length_squared() / 3.0;
+        let pairs = differences.iter().zip(&light);
+        let relative = relative_difference(pairs.filter_map(|(difference, light)| {
+            Some([f64::from((*difference)?), f64::from(squared_light(light))])
+        }));
+        for (light, difference) in light.iter_mut().zip(differences) {
+            light.variance += difference.unwrap_or(relative * squared_light(light));
+        }
+        light
     }
 
     /// Makes lamps share samples in blocks of which a good part lies in penumbrae of any source (see
     /// [`shares_penumbrae`]): behind a grille, or among many thin blockers. The visible share of each texel by itself
     /// would take hundreds of rays, while smoothing makes use of the neighbours' samples. The light of these blocks is
-    /// sampled again, unless the time is up.
+    /// sampled again.
     pub fn share_penumbrae(
         &mut self,
         direct: &mut [Direct],
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<(), BakeError> {
-        if decide(monitor, monitor.clock().is_over())? {
-            return Ok(());
-        }
         let lamps = monitor.run_interruptible(0.0, || {
             let mut lamps = self.shafts.unresolved(&self.cuts, |_, cut| cut.has_all_lamps);
             if lamps.is_empty() {
@@ -225,12 +256,18 @@ impl<'a> SourceSampler<'a> {
     }
 
     /// The texels in or near penumbras, as far as the first pass has found them: those that have, within [`REACH`], a
-    /// texel (perhaps themselves) that saw a source partly, or one that saw other sources than they did.
-    pub fn doubtful_texels(&self, direct: &[Direct]) -> Vec<CoveredTexel> {
-        let texels = self.texels;
+    /// texel (perhaps themselves) that saw a source partly, or one that saw other sources than they did. Of interpolated
+    /// texels, those that are uncertain.
+    pub fn doubtful_texels(&self, light: &IndividualLight) -> Vec<CoveredTexel> {
+        let (texels, direct) = (self.texels, &light.direct);
+        let is_uncertain =
+            |direct: &Direct| direct.variance > UNCERTAIN * direct.baked.length_squared() / 3.0;
         let seen_at = |place: MapTexel| texels.open_at(place).map(|texel| direct[texel.place()].seen);
         let is_doubtful = |&(covered, texel): &(CoveredTexel, &Texel)| {
             let Direct { seen, sampled, .. } = direct[covered.place()];
+            if light.samples[covered.place()] == INTERPOLATED {
+                return is_uncertain(&direct[covered.place()]);
+            }
             let map = &texels.layout.maps[texel.map.place()];
             let differs = |other: VisibilitySummary| other.partly || other.signature != seen.signature;
             let mut near = map.neighbourhood(texel.x, texel.y, REACH);
@@ -296,21 +333,25 @@ impl<'a> SourceSampler<'a> {
     }
 }
 
-/// The light of a texel that was not sampled, from the representatives around it and its own. By how much these differ
-/// counts as its error.
-fn interpolated(direct: &[Direct], around: &[(CoveredTexel, f32)], own: CoveredTexel) -> Direct {
+/// The light of a texel that was not sampled, from the representatives around it and its own, with their noise; and the
+/// square of by how much they differ, mean of the channels, if there are several.
+fn interpolated(
+    direct: &[Direct],
+    around: &[(CoveredTexel, f32)],
+    own: CoveredTexel,
+) -> (Direct, Option<f32>) {
     let sum = |of: &dyn Fn(&Direct) -> Vec3| -> Vec3 {
         around.iter().map(|(other, weight)| *weight * of(&direct[other.place()])).sum()
     };
     let (baked, mixed) = (sum(&|light| light.baked), sum(&|light| light.mixed));
-    let squared = |error: Vec3| error.length_squared() / 3.0;
-    let error = |(other, weight): &(CoveredTexel, f32)| {
-        let light = &direct[other.place()];
-        weight * (squared(light.baked - baked) + weight * light.variance)
+    let variance =
+        around.iter().map(|(other, weight)| weight * weight * direct[other.place()].variance).sum();
+    let difference = |(other, weight): &(CoveredTexel, f32)| {
+        weight * (direct[other.place()].baked - baked).length_squared() / 3.0
     };
-    let variance = around.iter().map(error).sum();
+    let differences = (around.len() > 1).then(|| around.iter().map(difference).sum());
     let seen = direct[own.place()].seen;
-    Direct { baked, mixed, variance, sampled: true, seen, ..Direct::default() }
+    (Direct { baked, mixed, variance, sampled: true, seen, ..Direct::default() }, differences)
 }
 
 /// The light of a texel from a previous bake.
@@ -333,6 +374,11 @@ const ENOUGH_IN_PENUMBRAE: u32 = 32;
 const PENUMBRA_SHARE: f32 = 0.2;
 /// The same where they are fewer, as on a small box.
 const PENUMBRA_SHARE_OF_FEW: f32 = 0.5;
+
+/// In place of a number of samples: the texel was interpolated. It counts as having one sample.
+const INTERPOLATED: u32 = 1;
+/// The variance from which on an interpolated texel is uncertain, relative to its squared light: 1 % of the light.
+const UNCERTAIN: f32 = 1e-4;
 
 /// How far around a texel that saw a penumbra others may be in it too, in texels.
 const REACH: u32 = 2;

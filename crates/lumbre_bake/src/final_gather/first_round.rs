@@ -45,11 +45,11 @@ pub(crate) fn cast_first_round(
     }
     // A sample of every texel is better than all samples in the first maps and none in the last; and first of one texel
     // of each block, for the same reason.
-    let representatives = Representatives::new(texels, BLOCK_SIDE);
+    let representatives = monitor.run_interruptible(0.0, || Representatives::new(texels, BLOCK_SIDE))?;
     let begun = monitor.seconds();
     let one_each = wanted.iter().map(|allocation| SampleAllocation { samples: 1, ..*allocation });
     let (first, rest): (Vec<_>, Vec<_>) =
-        one_each.partition(|allocation| representatives.is_one(allocation.texel));
+        one_each.partition(|allocation| representatives.represents_itself(allocation.texel));
     // How many samples of every wanted texel there is time for, besides the evaluation that follows, which is one of all
     // texels.
     let open = texels.open().count() as f64;
@@ -61,7 +61,7 @@ pub(crate) fn cast_first_round(
     monitor.pass(BLOCKS_PROGRESS);
     if !cache.cast(list, &first, gathered, seed, monitor)? {
         // Single samples here and there would be dots among the light of patches.
-        let is_replaced = |sums: &GatherSums| sums.samples == 0 || sums.rays > 0;
+        let is_replaced = |_, sums: &GatherSums| sums.samples == 0 || sums.rays > 0;
         from_patches(cache, texels, gathered, seed, is_replaced, monitor)?;
         return Ok(false);
     }
@@ -81,8 +81,8 @@ pub(crate) fn cast_first_round(
         in_time = cache.cast(list, &more, gathered, seed, monitor)?;
     }
     if !in_time {
-        copy_representatives(representatives.all(), gathered);
-        from_patches(cache, texels, gathered, seed, knows_nothing, monitor)?;
+        copy_representatives(representatives.list(), gathered);
+        from_patches(cache, texels, gathered, seed, |_, sums| knows_nothing(sums), monitor)?;
     }
     Ok(in_time)
 }

@@ -14,6 +14,7 @@ use crate::denoise::replicates::{mean, variance};
 use crate::monitor::BakeMonitor;
 use crate::sampling::hash;
 use crate::scene::Side;
+use crate::texel_index::CoveredTexel;
 
 /// How many texels are compared with their patches, and the samples of each replicate that they gather for it.
 const PROBED: usize = 2048;
@@ -31,6 +32,22 @@ pub(crate) fn knows_nothing(sums: &GatherSums) -> bool {
     sums.samples <= FEW_SAMPLES && sums.sums.iter().all(|sum| *sum == Vec3::ZERO)
 }
 
+/// The gather's few samples give way to the patches where their noise exceeds the patches' error by this factor: noise is
+/// smoothed, while the facets of patches catch the eye.
+const MUCH_NOISIER: f64 = 2.0;
+
+/// Whether the patches' light is much closer to the truth than what texels show that have gathered with so much noise (a
+/// ratio of sums of squares: errors by light).
+pub(crate) fn are_much_better(
+    cache: &RadianceCache<'_>,
+    texels: &CoveredTexels<'_>,
+    squared_noise: f64,
+    seed: u32,
+    monitor: &mut BakeMonitor<'_>,
+) -> Result<bool, BakeError> {
+    Ok(squared_noise > (MUCH_NOISIER * error_of_patches(cache, texels, seed, monitor)?).powi(2))
+}
+
 /// Gives the irradiance of its patch to every open texel for whose sums `is_replaced` holds. The error stated for it is,
 /// relative to the light, that of [`error_of_patches`].
 pub(crate) fn from_patches(
@@ -38,17 +55,22 @@ pub(crate) fn from_patches(
     texels: &CoveredTexels<'_>,
     gathered: &mut [GatherSums],
     seed: u32,
-    is_replaced: impl Fn(&GatherSums) -> bool,
+    is_replaced: impl Fn(CoveredTexel, &GatherSums) -> bool,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<(), BakeError> {
-    let is_replaced = |(texel, sums): &(&Texel, &mut GatherSums)| is_replaced(sums) && !texel.is_hidden();
-    if !texels.list.iter().zip(gathered.iter_mut()).any(|pair| is_replaced(&pair)) {
+    let replaced: Vec<CoveredTexel> = texels
+        .open()
+        .map(|(texel, _)| texel)
+        .filter(|&texel| is_replaced(texel, &gathered[texel.place()]))
+        .collect();
+    if replaced.is_empty() {
         return Ok(());
     }
     monitor.pass(PROBE_PROGRESS);
     let relative_error = error_of_patches(cache, texels, seed, monitor)?;
-    for (texel, sums) in texels.list.iter().zip(gathered).filter(is_replaced) {
-        let light = patch_light(cache, texel);
+    for texel in replaced {
+        let light = patch_light(cache, &texels.list[texel.place()]);
+        let sums = &mut gathered[texel.place()];
         *sums = GatherSums {
             sums: [light; REPLICATES],
             samples: 1,

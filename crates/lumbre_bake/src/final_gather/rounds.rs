@@ -11,6 +11,7 @@ use super::first_round::{ROUND_PROGRESS, cast_first_round};
 use super::gather_sums::GatherSums;
 use super::learned_guide::learn;
 use super::map_error::MapError;
+use super::patch_fallback::{are_much_better, from_patches};
 use super::radiance_cache::RadianceCache;
 use super::reused_gather::ReusedGather;
 use super::round_goals::{CONVERGENCE_ORDER, ErrorLeft, TARGET};
@@ -124,7 +125,7 @@ pub(crate) fn gather(
         let begun = monitor.seconds();
         let result = planner.evaluate(&gathered, &reads, cache.exchange.residual_bound, monitor)?;
         let is_reached = result.error.reaches(options.error);
-        curve.push(ErrorAtTime { seconds: result.seconds, error: result.error.relative });
+        curve.push(result.error_at_time());
         // A round needs time for its rays, and for another evaluation.
         let affordable = speed.affordable_samples(monitor.seconds() - begun, monitor.clock());
         if is_reached {
@@ -154,6 +155,15 @@ pub(crate) fn gather(
         speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
         plan = Some(next);
     };
+    let is_kept =
+        |texel: CoveredTexel| reused.is_some_and(|reused| reused.gathered[texel.place()].samples > 0);
+    let by_patches = if ended == Ended::Time && plan.is_none() {
+        planner.by_patches(cache, &mut gathered, &result, is_kept, &reads, monitor)?
+    } else {
+        None
+    };
+    curve.extend(by_patches.as_ref().map(RoundResult::error_at_time));
+    let result = by_patches.unwrap_or(result);
     let RoundResult { light, variances, error, .. } = result;
     monitor.run_interruptible(1.0, || {
         cache.texels.set_indirect(list, &gathered, &light, &variances.expected);
@@ -222,6 +232,12 @@ struct RoundResult {
     /// The error of the whole map, and the seconds that the bake had taken when it was known.
     error: MapError,
     seconds: f64,
+}
+
+impl RoundResult {
+    fn error_at_time(&self) -> ErrorAtTime {
+        ErrorAtTime { seconds: self.seconds, error: self.error.relative }
+    }
 }
 
 /// What the next round should cast.
@@ -323,6 +339,28 @@ impl<'a> RoundPlanner<'a> {
         monitor.advance(1.0)?;
         let light = without_patch_bias(&denoised.estimates, &patches);
         Ok(RoundResult { light, variances, reducible: denoised.errors(), error, seconds })
+    }
+
+    /// If the patches' light is much better than the few samples of the first round, the result with it in their place, but
+    /// for texels that keep the light of a former bake.
+    fn by_patches(
+        &self,
+        cache: &RadianceCache<'_>,
+        gathered: &mut [GatherSums],
+        result: &RoundResult,
+        is_kept: impl Fn(CoveredTexel) -> bool,
+        reads: &TexelReads,
+        monitor: &mut BakeMonitor<'_>,
+    ) -> Result<Option<RoundResult>, BakeError> {
+        let (texels, seed) = (self.texels, self.options.seed);
+        let sum = |of: &dyn Fn(usize) -> f64| self.open.iter().map(|texel| of(texel.place())).sum::<f64>();
+        let noise = sum(&|place| f64::from(result.reducible.expected[place]));
+        let light = sum(&|place| wide_channel_mean(result.light[place]).powi(2));
+        if !are_much_better(cache, texels, noise / light, seed, monitor)? {
+            return Ok(None);
+        }
+        from_patches(cache, texels, gathered, seed, |texel, _| !is_kept(texel), monitor)?;
+        self.evaluate(gathered, reads, cache.exchange.residual_bound, monitor).map(Some)
     }
 
     /// The error that is left after a round, and the part of it that rays reduce.

@@ -9,7 +9,7 @@ pub(crate) mod exchange;
 mod exchange_tests;
 pub(crate) mod face_clusters;
 #[cfg(test)]
-mod form_factor_tests;
+pub(crate) mod form_factor_tests;
 pub(crate) mod form_factors;
 pub(crate) mod global_lines;
 pub(crate) mod larger_patches;

@@ -41,7 +41,7 @@ impl PlaneFrame {
 /// A contact line on a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Contact {
-    /// Its ends, in the frame of the triangle's plane.
+    /// Its ends: in the frame of the triangle's plane, unless stated otherwise.
     pub line: [DVec2; 2],
     /// Whether the surface on one side of it may be hidden: under something that lies there, or inside a solid. A sheet
     /// that stands there hides nothing, as light reaches both of its sides.
