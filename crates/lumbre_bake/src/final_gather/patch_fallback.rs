@@ -127,3 +127,86 @@ fn error_of_patches(
     let squared = (squared_differences.max(0.0) + scatter.sqrt()) / squared_light;
     Ok(if squared_light > 0.0 { squared.sqrt().min(1.0) } else { 1.0 })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+    use std::sync::Arc;
+
+    use glam::{DAffine3, DVec3};
+    use lumbre_mesh::shapes;
+
+    use super::*;
+    use crate::direct_light::direct_light;
+    use crate::radiosity::{Exchange, PatchResolution, Subdivision, Transport};
+    use crate::scene::laid_out::laid_out;
+    use crate::scene::{PlacedPrimitive, SceneObject, StaticScene};
+    use crate::sources::Sources;
+    use crate::{BakeOptions, Density};
+
+    /// Calls `check` with a plate under the sky that a table shades, and the light that its patches exchange.
+    fn under_a_table(check: impl FnOnce(&RadianceCache<'_>, &CoveredTexels<'_>, &mut BakeMonitor<'_>)) {
+        let object = |size: Vec3, height: f64| {
+            let (mesh, transform) =
+                (Arc::new(shapes::cuboid(size, 1)), DAffine3::from_translation(DVec3::Y * height));
+            SceneObject::new("", vec![PlacedPrimitive { mesh, transform, ..PlacedPrimitive::default() }])
+        };
+        let objects = vec![object(Vec3::new(2.0, 0.1, 2.0), 0.0), object(Vec3::new(1.0, 0.1, 1.0), 0.4)];
+        let input = StaticScene { objects, sky: Vec3::ONE, ..StaticScene::default() }.checked().unwrap();
+        let options = BakeOptions { density: Density::TexelsPerMeter(16.0), ..BakeOptions::default() };
+        let (layout, scene) = laid_out(&input.objects, input.space(), &options);
+        let sources = Sources::new(&scene, Vec::new(), Vec::new(), input.sky);
+        let mut carry_on = |_| ControlFlow::Continue(());
+        let mut monitor = BakeMonitor::new(&mut carry_on, None);
+        let (texels, _) = CoveredTexels::new(&scene, &layout, &mut monitor).unwrap();
+        let (direct, _) = direct_light(&sources, &texels, &[], &options, &mut monitor).unwrap();
+        let resolution = PatchResolution {
+            subdivision: Subdivision::new(&scene, 0.2 * scene.space.scale as f32),
+            texture_points: 16,
+            form_factor_rays: 200_000,
+            memory_bytes: 0,
+        };
+        let (transport, _) = Transport::new(&scene, &resolution, &options, &mut monitor).unwrap();
+        let ((exchange, _), _) = Exchange::new(&sources, transport, &[], &options, &mut monitor).unwrap();
+        let (exchange, _) = exchange.expect("light bounces");
+        let cache = RadianceCache::new(&sources, &texels, &direct, exchange, &options, &mut monitor).unwrap();
+        check(&cache, &texels, &mut monitor);
+    }
+
+    #[test]
+    fn patches_replace_only_what_is_much_noisier() {
+        under_a_table(|cache, texels, monitor| {
+            let error = error_of_patches(cache, texels, 1, monitor).unwrap();
+            assert!(error > 0.005 && error < 0.5, "{error}");
+            let mut are_better =
+                |noise: f64| are_much_better(cache, texels, noise.powi(2), 1, monitor).unwrap();
+            assert_eq!(
+                [1.0, 1.9, 2.1, 10.0].map(|factor| are_better(factor * error)),
+                [false, false, true, true]
+            );
+        });
+    }
+
+    #[test]
+    fn patches_leave_what_is_kept_and_state_their_error() {
+        under_a_table(|cache, texels, monitor| {
+            let kept =
+                GatherSums { sums: [Vec3::splat(7.0); REPLICATES], samples: 1, ..GatherSums::default() };
+            let mut gathered = vec![kept; texels.list.len()];
+            let is_replaced = |texel: CoveredTexel, _: &GatherSums| texel.0.is_multiple_of(3);
+            from_patches(cache, texels, &mut gathered, 1, is_replaced, monitor).unwrap();
+            let error = error_of_patches(cache, texels, 1, monitor).unwrap();
+            for (texel, of) in texels.open() {
+                let sums = &gathered[texel.place()];
+                if is_replaced(texel, sums) {
+                    let light = patch_light(cache, of);
+                    assert_eq!(sums.estimates()[0], light);
+                    let stated = f64::from(sums.patch_error().length());
+                    assert!((stated - error * wide_channel_mean(light)).abs() < 1e-3 * (1e-3 + stated));
+                } else {
+                    assert_eq!(sums.sums, kept.sums);
+                }
+            }
+        });
+    }
+}
