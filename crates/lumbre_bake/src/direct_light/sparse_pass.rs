@@ -12,6 +12,8 @@ use crate::texel_index::CoveredTexel;
 const COARSEST: u32 = 8;
 /// The sides of smaller blocks that there may be time for. Blocks of one texel leave nothing to be interpolated.
 const SMALLER: [u32; 3] = [1, 2, 4];
+/// So many texels are sampled whatever time it takes, so that small maps never lose quality.
+const ALWAYS_SAMPLED: usize = 8192;
 /// Smaller blocks may take this share of the time that is left until this multiple of what the stage should take: a map
 /// without interpolated texels is worth a delay.
 const SHARE_OF_TIME: f64 = 0.5;
@@ -47,7 +49,7 @@ pub(crate) fn sparse_pass<'a, T: Copy + Send + Sync + Record>(
             pass.seconds += monitor.seconds() - begun;
             Ok::<_, BakeError>(())
         };
-    if monitor.clock().seconds_left().is_none() {
+    if monitor.clock().seconds_left().is_none() || wanted.len() <= ALWAYS_SAMPLED {
         sample(wanted, share, &mut pass, monitor)?;
         return Ok(pass);
     }
