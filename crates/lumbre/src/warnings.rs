@@ -1,5 +1,5 @@
 //! Warnings for people: of many that differ only in the object and its numbers, the first few and a count. The JSON
-//! report lists all of them.
+//! report lists all those of the bake.
 
 /// Warnings of one kind that are shown.
 const SHOWN: usize = 3;
@@ -19,17 +19,17 @@ pub fn shortened(warnings: impl Iterator<Item = String>) -> Vec<String> {
         if alike.len() > SHOWN + 1 {
             let more = alike.len() - SHOWN;
             alike.truncate(SHOWN);
-            alike.push(format!("the same of {more} more objects (--json lists them)"));
+            alike.push(format!("{more} more warnings like these (--json lists those of the bake)"));
         }
         alike
     };
     kinds.into_iter().flat_map(shown).collect()
 }
 
-/// What a warning says, without the object that it is about and without numbers.
+/// What a warning says, without the object that it is about, and without digits, signs and points of numbers.
 fn kind(warning: &str) -> String {
     let (_, said) = warning.split_once(": ").unwrap_or(("", warning));
-    said.chars().filter(|character| !character.is_ascii_digit()).collect()
+    said.chars().filter(|character| !character.is_ascii_digit() && !"+-.".contains(*character)).collect()
 }
 
 #[cfg(test)]
@@ -51,7 +51,7 @@ mod tests {
             "box 0: 2 triangles without area were left out",
             "box 1: 3 triangles without area were left out",
             "box 2: 4 triangles without area were left out",
-            "the same of 6 more objects (--json lists them)",
+            "6 more warnings like these (--json lists those of the bake)",
             "floor: its texture is coarse",
             "3 triangles lie exactly on others",
         ];

@@ -7,7 +7,8 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::BakeError;
-use crate::checkpoint::Record;
+/// What chunks consist of: values that a checkpoint can keep.
+pub(crate) use crate::checkpoint::Record;
 use crate::monitor::BakeMonitor;
 
 /// Seconds that a chunk should take: short enough for regular progress, long enough to keep all threads busy.

@@ -160,8 +160,8 @@ pub(crate) fn patch_resolution(
     let most_lines = resolution.subdivision.most_lines;
     if resolution.subdivision.has_few_lines() {
         notes.warnings.push(format!(
-            "so many surfaces stand on or cross each other that patches are cut along {most_lines} contact line(s) per cell at most; light \
-             that bounces off near the others mixes (not so with the final quality, an error below 0.04 and enough time)"
+            "so many surfaces stand on or cross each other that at most {most_lines} of their lines cut a patch; light that bounces off \
+             near the lines left out mixes (not so with the final quality, an error below 0.04 and enough time)"
         ));
     }
     if resolution.subdivision.side > side {

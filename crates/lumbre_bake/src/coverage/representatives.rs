@@ -53,8 +53,8 @@ impl<'a> Representatives<'a> {
     }
 
     /// The representatives from which a texel is interpolated, with weights that sum to 1: those of the blocks around it
-    /// for which `fits` holds, that are in its chart and not beyond a contact line. Where blocks are whole, this is
-    /// bilinear interpolation.
+    /// for which `fits` holds, that are in its chart and not beyond a contact line; if there is none, its own
+    /// representative, whether that fits or not. Where blocks are whole, this is bilinear interpolation.
     pub fn around(
         &self,
         texel: CoveredTexel,

@@ -11,7 +11,7 @@ use crate::sources::{LightCut, Sources};
 use crate::texel_index::CoveredTexel;
 
 /// Texels along a block's side.
-const BLOCK_SIDE: u32 = 16;
+pub(crate) const BLOCK_SIDE: u32 = 16;
 
 /// The light cuts of all blocks.
 pub(crate) struct LightCuts {

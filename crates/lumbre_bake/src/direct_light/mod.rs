@@ -69,7 +69,7 @@ pub(crate) fn direct_light(
 ) -> Result<(DirectLight, StageNotes), BakeError> {
     let mut sampler = SourceSampler::new(sources, texels, known, options, monitor)?;
     let mut light = sampler.first_pass(monitor)?;
-    // That samples whole blocks anew, for which there is no time if even the first pass had too little.
+    // Sharing samples whole blocks anew, which would take the time that the first pass has just saved.
     if light.is_complete {
         sampler.share_penumbrae(&mut light.direct, monitor)?;
     }

@@ -360,7 +360,10 @@ impl<'a> SharedLight<'a> {
             let mut sums = std::mem::take(&mut self.sums);
             let taken = take_samples(&allocated, &mut sums, monitor, |to, sums| {
                 let place = to.texel.place();
-                let mut sums = if self.is_interpolated(place) { SampleSums::default() } else { sums };
+                let mut sums = match self.is_interpolated(place) {
+                    true => SampleSums { controlled_light: sums.controlled_light, ..SampleSums::default() },
+                    false => sums,
+                };
                 self.add(place, &mut sums, to.samples);
                 sums
             })?;

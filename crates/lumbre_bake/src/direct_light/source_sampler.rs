@@ -32,7 +32,7 @@ pub(crate) struct IndividualLight {
     samples: Vec<u32>,
     /// The texels that may need more samples than the first pass takes.
     pub doubtful: Vec<CoveredTexel>,
-    /// Whether there was time to sample all of them.
+    /// Whether the first pass had time to sample all texels, so that none is interpolated.
     pub is_complete: bool,
 }
 
@@ -42,6 +42,7 @@ impl IndividualLight {
         let fewer = self.doubtful.iter().filter(|texel| self.samples[texel.place()] < many);
         fewer.map(|&texel| SampleAllocation { texel, samples: many }).collect()
     }
+
     /// The expected variances relative to the squared local light.
     fn relative_variances(&self, local: &LocalLight) -> Vec<f32> {
         let variances: Vec<f32> = self.direct.iter().map(|direct| direct.variance - direct.caution).collect();
@@ -189,12 +190,19 @@ impl<'a> SourceSampler<'a> {
         let (mut light, differences): (Vec<Direct>, Vec<Option<f32>>) =
             missing.par_iter().map(interpolate).unzip();
         let squared_light = |light: &Direct| light.baked.length_squared() / 3.0;
-        let pairs = differences.iter().zip(&light);
-        let relative = relative_difference(pairs.filter_map(|(difference, light)| {
-            Some([f64::from((*difference)?), f64::from(squared_light(light))])
-        }));
+        let pairs: Vec<[f64; 2]> = differences
+            .iter()
+            .zip(&light)
+            .filter_map(|(difference, light)| {
+                Some([f64::from((*difference)?), f64::from(squared_light(light))])
+            })
+            .collect();
+        let relative = relative_difference(pairs.iter().copied());
+        // What is dark may lie in the shadow that its representative is in, or beside it.
+        let mean_light = light.iter().map(squared_light).sum::<f32>() / light.len().max(1) as f32;
         for (light, difference) in light.iter_mut().zip(differences) {
-            light.variance += difference.unwrap_or(relative * squared_light(light));
+            let of_one = relative * squared_light(light).max(mean_light);
+            light.variance += difference.unwrap_or(of_one);
         }
         light
     }

@@ -1,23 +1,25 @@
 //! A first pass under a time limit: over one texel of each block first, and then over as many of the others as there seems
 //! to be time for. What is sampled, and how the rest is interpolated, is the caller's.
 
+use super::light_cuts::BLOCK_SIDE;
 use crate::BakeError;
-use crate::checkpoint::Record;
-use crate::chunks::{decide, in_chunks};
+use crate::chunks::{Record, decide, in_chunks};
 use crate::coverage::{CoveredTexels, Representatives};
 use crate::monitor::BakeMonitor;
 use crate::texel_index::CoveredTexel;
 
 /// The side of the blocks of which one texel is sampled whatever time it takes, in texels.
 const COARSEST: u32 = 8;
+/// A texel must have the light cut of its own representative, from which it is interpolated if no other has the same.
+const _: () = assert!(BLOCK_SIDE.is_multiple_of(COARSEST));
 /// The sides of smaller blocks that there may be time for. Blocks of one texel leave nothing to be interpolated.
 const SMALLER: [u32; 3] = [1, 2, 4];
-/// So many texels are sampled whatever time it takes, so that small maps never lose quality.
+/// If no more texels than this are wanted, all of them are sampled whatever time it takes: small scenes never lose quality.
 const ALWAYS_SAMPLED: usize = 8192;
-/// Smaller blocks may take this share of the time that is left until this multiple of what the stage should take: a map
-/// without interpolated texels is worth a delay.
-const SHARE_OF_TIME: f64 = 0.5;
+/// A map without interpolated texels is worth a delay: the stage may overrun its deadline by this factor.
 const LATEST: f64 = 1.6;
+/// The share of the time left until then that smaller blocks may take.
+const SHARE_OF_TIME: f64 = 0.5;
 /// The share of the rest of the stage's progress that the first blocks are.
 const BLOCKS_PROGRESS: f32 = 0.02;
 
@@ -46,14 +48,15 @@ pub(crate) fn sparse_pass<'a, T: Copy + Send + Sync + Record>(
             let begun = monitor.seconds();
             let values = in_chunks(texels.len(), monitor, |place| sample(texels[place]))?;
             pass.sampled.extend(texels.iter().copied().zip(values));
-            pass.seconds += monitor.seconds() - begun;
+            // A chunk from a checkpoint sets the clock to when it was computed, which may be before `begun`.
+            pass.seconds += (monitor.seconds() - begun).max(0.0);
             Ok::<_, BakeError>(())
         };
     if monitor.clock().seconds_left().is_none() || wanted.len() <= ALWAYS_SAMPLED {
         sample(wanted, share, &mut pass, monitor)?;
         return Ok(pass);
     }
-    // They take no time, and would make all others seem quick.
+    // Hidden texels take no time, and would make all others seem quick.
     debug_assert!(wanted.iter().all(|texel| !texels.list[texel.place()].is_hidden()));
     let mut is_wanted = vec![false; texels.list.len()];
     wanted.iter().for_each(|texel| is_wanted[texel.place()] = true);
@@ -70,20 +73,22 @@ pub(crate) fn sparse_pass<'a, T: Copy + Send + Sync + Record>(
     let has_time = |side: &u32| rest.len() as f64 * seconds_per_texel <= left * f64::from(side * side);
     let side = decide(monitor, SMALLER.into_iter().find(has_time).unwrap_or(COARSEST))?;
     let blocks = match side {
-        COARSEST => coarse,
-        side => monitor.run_interruptible(1.0, || Representatives::new(texels, side))?,
+        1 => None,
+        COARSEST => Some(coarse),
+        side => Some(monitor.run_interruptible(1.0, || Representatives::new(texels, side))?),
     };
-    let next: Vec<CoveredTexel> = rest.into_iter().filter(|texel| must_be_sampled(&blocks, *texel)).collect();
+    let is_next = |texel: &CoveredTexel| blocks.as_ref().is_none_or(|blocks| must_be_sampled(blocks, *texel));
+    let next: Vec<CoveredTexel> = rest.into_iter().filter(is_next).collect();
     sample(&next, share, &mut pass, monitor)?;
     if pass.sampled.len() < wanted.len() {
         monitor.cut_short();
-        pass.blocks = Some(blocks);
+        pass.blocks = blocks;
     }
     Ok(pass)
 }
 
-/// By how much texels differ from what they are interpolated from: the squared differences relative to the squared light,
-/// from pairs of both. Where there is no pair, all of the light may be wrong.
+/// By how much texels differ from what they are interpolated from: the sum of the squared differences divided by that of
+/// the squared light, from pairs of both. Where there is no light in any pair, all of it may be wrong.
 pub(crate) fn relative_difference(pairs: impl Iterator<Item = [f64; 2]>) -> f32 {
     let [differences, light] = pairs.fold([0.0, 0.0], |sum, pair| [sum[0] + pair[0], sum[1] + pair[1]]);
     let relative = differences.max(0.0) / light;

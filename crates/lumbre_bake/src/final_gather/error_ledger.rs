@@ -4,8 +4,9 @@
 //! ```text
 //!   term           what it is                                  found by                      over a whole map
 //!   ─────────────  ──────────────────────────────────────────  ────────────────────────────  ─────────────────────────
-//!   direct light   spread of batches of shadow samples         sources::irradiance,          without its caution
-//!                                                              direct_light::shared_light
+//!   direct light   spread of batches of shadow samples;        sources::irradiance,          without its caution
+//!                  differences of the texels from which       direct_light::shared_light,
+//!                  one is interpolated                        direct_light::sparse_pass
 //!   noise          spread of four replicates, after smoothing  denoise::replicates::spread   the neighbours' mean
 //!   smoothing      smoothed half of the replicates against     denoise::smoothing_bias       the same
 //!                  the raw other half

@@ -36,16 +36,16 @@ pub(crate) fn knows_nothing(sums: &GatherSums) -> bool {
 /// smoothed, while the facets of patches catch the eye.
 const MUCH_NOISIER: f64 = 2.0;
 
-/// Whether the patches' light is much closer to the truth than what texels show that have gathered with so much noise (a
-/// ratio of sums of squares: errors by light).
+/// Whether the patches' light is much closer to the truth than that of texels with so much noise: the sum of their squared
+/// errors divided by that of their squared light.
 pub(crate) fn are_much_better(
     cache: &RadianceCache<'_>,
     texels: &CoveredTexels<'_>,
-    squared_noise: f64,
+    relative_squared_noise: f64,
     seed: u32,
     monitor: &mut BakeMonitor<'_>,
 ) -> Result<bool, BakeError> {
-    Ok(squared_noise > (MUCH_NOISIER * error_of_patches(cache, texels, seed, monitor)?).powi(2))
+    Ok(relative_squared_noise > (MUCH_NOISIER * error_of_patches(cache, texels, seed, monitor)?).powi(2))
 }
 
 /// Gives the irradiance of its patch to every open texel for whose sums `is_replaced` holds. The error stated for it is,

@@ -121,7 +121,7 @@ pub(crate) fn gather(
     let mut plan: Option<RoundPlan> = None;
     let mut stalled_rounds = 0;
     let mut reads = TexelReads::new(cache.exchange.patches.mean_reflectance(), &gathered);
-    let (result, ended) = loop {
+    let (result, ended, is_late) = loop {
         let begun = monitor.seconds();
         let result = planner.evaluate(&gathered, &reads, cache.exchange.residual_bound, monitor)?;
         let is_reached = result.error.reaches(options.error);
@@ -129,18 +129,18 @@ pub(crate) fn gather(
         // A round needs time for its rays, and for another evaluation.
         let affordable = speed.affordable_samples(monitor.seconds() - begun, monitor.clock());
         if is_reached {
-            break (result, Ended::Reached);
+            break (result, Ended::Reached, false);
         }
         let left = planner.left(&gathered, &result);
         let next = planner.plan(&gathered, &result.error, &left, decide(monitor, affordable)?);
-        let is_late = !in_time || monitor.clock().is_over() || next.is_late;
+        let is_late = decide(monitor, !in_time || monitor.clock().is_over() || next.is_late)?;
         let is_hardly_reducible = left.is_hardly_reducible(options.error.powi(2), planner.count());
         let has_stalled = plan.as_ref().is_some_and(|plan| plan.has_stalled(&left));
         stalled_rounds = if has_stalled { stalled_rounds + 1 } else { 0 };
         let ended = Ended::after(false, is_late || monitor.is_late(), next.is_last);
         let rays_gain_nothing = is_hardly_reducible || stalled_rounds == MAX_STALLED_ROUNDS;
         if is_late || rays_gain_nothing || is_all_reused || next.is_last {
-            break (result, ended);
+            break (result, ended, is_late);
         }
         let variances = &result.reducible.expected;
         monitor.run_interruptible(1.0, || {
@@ -155,23 +155,24 @@ pub(crate) fn gather(
         speed.add(all_samples(&gathered) - samples, monitor.seconds() - begun);
         plan = Some(next);
     };
+    // Texels for which there was no time have no rays: their sums are those of a neighbour, or the light of their patch.
+    let cast = gathered.iter().filter(|sums| sums.rays > 0);
+    let cast: u64 = cast.map(|sums| u64::from(sums.samples) * REPLICATES as u64).sum();
+    let gather_rays = cast as f64 / planner.count();
     let is_kept =
         |texel: CoveredTexel| reused.is_some_and(|reused| reused.gathered[texel.place()].samples > 0);
-    let by_patches = if ended == Ended::Time && plan.is_none() {
-        planner.by_patches(cache, &mut gathered, &result, is_kept, &reads, monitor)?
-    } else {
-        None
+    let by_patches = match is_late && plan.is_none() {
+        true => planner.by_patches(cache, &mut gathered, &result, is_kept, &reads, monitor)?,
+        false => None,
     };
     curve.extend(by_patches.as_ref().map(RoundResult::error_at_time));
+    let is_reached = by_patches.as_ref().is_some_and(|result| result.error.reaches(options.error));
+    let ended = if is_reached { Ended::Reached } else { ended };
     let result = by_patches.unwrap_or(result);
     let RoundResult { light, variances, error, .. } = result;
     monitor.run_interruptible(1.0, || {
         cache.texels.set_indirect(list, &gathered, &light, &variances.expected);
     })?;
-    // Texels for which there was no time have no rays: their sums are those of a neighbour, or the light of their patch.
-    let cast = gathered.iter().filter(|sums| sums.rays > 0);
-    let cast: u64 = cast.map(|sums| u64::from(sums.samples) * REPLICATES as u64).sum();
-    let gather_rays = cast as f64 / planner.count();
     let leaked_rays = cache.scene.leaks.count() - leaked_before;
     let rays = cache.steep.rays + gathered.iter().map(|sums| sums.rays).sum::<u64>();
     let report = GatherReport { error, curve, ended, leaked_rays, gather_rays };
@@ -353,10 +354,13 @@ impl<'a> RoundPlanner<'a> {
         monitor: &mut BakeMonitor<'_>,
     ) -> Result<Option<RoundResult>, BakeError> {
         let (texels, seed) = (self.texels, self.options.seed);
-        let sum = |of: &dyn Fn(usize) -> f64| self.open.iter().map(|texel| of(texel.place())).sum::<f64>();
+        let gathered_anew: Vec<CoveredTexel> =
+            self.open.iter().copied().filter(|texel| !is_kept(*texel)).collect();
+        let sum =
+            |of: &dyn Fn(usize) -> f64| gathered_anew.iter().map(|texel| of(texel.place())).sum::<f64>();
         let noise = sum(&|place| f64::from(result.reducible.expected[place]));
         let light = sum(&|place| wide_channel_mean(result.light[place]).powi(2));
-        if !are_much_better(cache, texels, noise / light, seed, monitor)? {
+        if gathered_anew.is_empty() || !are_much_better(cache, texels, noise / light, seed, monitor)? {
             return Ok(None);
         }
         from_patches(cache, texels, gathered, seed, |texel, _| !is_kept(texel), monitor)?;
