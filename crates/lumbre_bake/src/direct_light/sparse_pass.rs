@@ -1,5 +1,5 @@
-//! A first pass under a time limit: over one texel of each block first, and then over as many of the others as there seems
-//! to be time for. What is sampled, and how the rest is interpolated, is the caller's.
+//! A first pass under a time limit: over a few texels, which show how long the others will take, and then over all others
+//! or over as fine a grid of them as there seems to be time for. What is sampled, and how the rest is interpolated, is the caller's.
 
 use super::light_cuts::BLOCK_SIDE;
 use crate::BakeError;
@@ -17,11 +17,11 @@ const SMALLER: [u32; 3] = [1, 2, 4];
 /// If no more texels than this are wanted, all of them are sampled whatever time it takes: small scenes never lose quality.
 const ALWAYS_SAMPLED: usize = 8192;
 /// A map without interpolated texels is worth a delay: the stage may overrun its deadline by this factor.
-const LATEST: f64 = 1.6;
+const LATEST: f64 = 2.0;
 /// The share of the time left until then that smaller blocks may take.
-const SHARE_OF_TIME: f64 = 0.5;
-/// The share of the rest of the stage's progress that the first blocks are.
-const BLOCKS_PROGRESS: f32 = 0.02;
+const SHARE_OF_TIME: f64 = 0.8;
+/// The share of the rest of the stage's progress that the first few texels are.
+const FEW_PROGRESS: f32 = 0.02;
 
 /// What a pass has sampled.
 pub(crate) struct SparsePass<'a, T> {
@@ -64,17 +64,18 @@ pub(crate) fn sparse_pass<'a, T: Copy + Send + Sync + Record>(
     let must_be_sampled = |blocks: &Representatives<'_>, texel: CoveredTexel| {
         blocks.represents_itself(texel) || !is_wanted[blocks.of(texel).place()]
     };
-    let coarse = monitor.run_interruptible(1.0, || Representatives::new(texels, COARSEST))?;
-    let (first, rest): (Vec<CoveredTexel>, Vec<CoveredTexel>) =
-        wanted.iter().partition(|texel| must_be_sampled(&coarse, **texel));
-    sample(&first, BLOCKS_PROGRESS, &mut pass, monitor)?;
+    // A few all over the level say how long the others will take.
+    let is_first = |place: usize| place.is_multiple_of((COARSEST * COARSEST) as usize);
+    let first: Vec<CoveredTexel> = wanted.iter().copied().step_by((COARSEST * COARSEST) as usize).collect();
+    let rest = wanted.iter().enumerate().filter(|(place, _)| !is_first(*place)).map(|(_, texel)| *texel);
+    let rest: Vec<CoveredTexel> = rest.collect();
+    sample(&first, FEW_PROGRESS, &mut pass, monitor)?;
     let seconds_per_texel = pass.seconds / first.len().max(1) as f64;
     let left = SHARE_OF_TIME * monitor.clock().until(LATEST).seconds_left().unwrap_or(f64::INFINITY);
     let has_time = |side: &u32| rest.len() as f64 * seconds_per_texel <= left * f64::from(side * side);
     let side = decide(monitor, SMALLER.into_iter().find(has_time).unwrap_or(COARSEST))?;
     let blocks = match side {
         1 => None,
-        COARSEST => Some(coarse),
         side => Some(monitor.run_interruptible(1.0, || Representatives::new(texels, side))?),
     };
     let is_next = |texel: &CoveredTexel| blocks.as_ref().is_none_or(|blocks| must_be_sampled(blocks, *texel));
